@@ -195,7 +195,7 @@ def test_passwords_and_tokens_are_used_and_not_stored(asp):
 def test_a_slow_answer_is_abandoned():
     began = time.monotonic()
     with pytest.raises(calls.NotificationFailed, match=r"no complete answer within 0\.2 s"):
-        calls._within(0.2, partial(time.sleep, 5.0))
+        calls.within(0.2, partial(time.sleep, 5.0))
     assert time.monotonic() - began < 3.0
 
 

@@ -1,5 +1,6 @@
 """Options shared by commands such as `track` and `watch`, each declared once, and their checks."""
 
+from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, get_args
@@ -20,6 +21,17 @@ def _hertz(text: str) -> float:
         return float(text)
     except ValueError:
         return case.read_amount("a frequency", "Hz", text)
+
+
+def duration(option: str) -> Callable[[object], float]:
+    """Return the parser of a duration such as 90d, 1h or 30min [s]."""
+
+    def parse(text: object) -> float:
+        if isinstance(text, float):  # the default
+            return text
+        return case.read_amount(option, "s", str(text))
+
+    return parse
 
 
 def _stage_source(text: str) -> str:
@@ -312,6 +324,7 @@ _OPTIONS = {
     "case": "--case",
     "clr": "--design",
     "lateral_unit": "--lateral-unit",
+    "keep_s": "--keep",
     "limit": "--forecast",
     "machine_conditions": "--dry-run",
     "method": "--method",

@@ -1,15 +1,15 @@
 """`asperity track` and `watch`: measured recordings, from files to a verdict."""
 
-import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import ExitStack, closing, contextmanager
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from asperity import monitoring, recording, report, trend
+from asperity import monitoring, recording, trend
 from asperity.cli.app import app
 from asperity.cli.forecast import series_forecaster
 from asperity.cli.options import (
@@ -42,21 +42,26 @@ from asperity.cli.options import (
     Workers,
     Worn,
     contact_at,
+    duration,
     require_output,
 )
-from asperity.cli.output import Block, Row, columns, progress, show, span, table, written
+from asperity.cli.output import progress
 from asperity.cli.series import end_with, track_series
+from asperity.cli.track_output import show_track
+from asperity.cli.watch_output import (
+    WatchDisplay,
+    print_sentences,
+    termination,
+    write_track,
+)
 from asperity.core import files, processes
 from asperity.core.errors import BadInput
-from asperity.core.quantities import NO_VALUE, quantity
 
 if TYPE_CHECKING:
-    from asperity.monitoring import Reading, Track, TrackSettings, Update
+    from asperity.monitoring import Reading, TrackSettings, Update, WatchSettings
     from asperity.recording import ReadOptions
     from asperity.resonance import SeriesMethod
     from asperity.trend import AlarmState, StageSource
-
-PAGE = "report.html"
 
 
 DataFiles = Annotated[
@@ -86,6 +91,41 @@ PollInterval = Annotated[
 ]
 SettleTime = Annotated[
     float, typer.Option(metavar="SECONDS", min=0.0, help="Time for which a file must be unchanged.")
+]
+KeptAge = Annotated[
+    float | None,
+    typer.Option(
+        metavar="AGE",
+        parser=duration("--keep"),
+        help="Thin out recordings older than this, such as 90d, to one a day (default: keep all).",
+    ),
+]
+Tree = Annotated[
+    bool,
+    typer.Option(
+        "--tree", help="Watch every subfolder as a measuring point (default: if DIR has only such)."
+    ),
+]
+LineProtocol = Annotated[
+    str | None,
+    typer.Option(
+        metavar="FILE|-|URL",
+        envvar="ASPERITY_LINE_PROTOCOL",
+        help="Write measurements by the InfluxDB line protocol: to a file, stdout or an address.",
+    ),
+]
+Prometheus = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE.prom", help="Write the latest values for a Prometheus exporter."),
+]
+ReportInterval = Annotated[
+    float | None,
+    typer.Option(
+        metavar="AGE",
+        parser=duration("--report-every"),
+        help="Interval between reports (default: 1h, of a tree 1d); "
+        "also written when the state changes.",
+    ),
 ]
 ExpectedInterval = Annotated[
     float | None,
@@ -157,8 +197,8 @@ def track(
             sensor=sensor,
             acknowledge=acknowledge,
         )
-    saved = _write(tracked, out or (), page)
-    _show_track(tracked, page, saved, store, as_json=as_json, quiet=quiet)
+    saved = write_track(tracked, out or (), page)
+    show_track(tracked, page, saved, store, as_json=as_json, quiet=quiet)
     end_with(tracked.alarm.state)
 
 
@@ -167,9 +207,12 @@ def watch(
     folder: WatchedFolder,
     out: ResultFolder = None,
     once: Once = False,
+    tree: Tree = False,
     every: PollInterval = 5.0,
     settle: SettleTime = 2.0,
     expect: ExpectedInterval = None,
+    report_every: ReportInterval = None,
+    keep: KeptAge = None,
     workers: Workers = None,
     rate: Rate = None,
     unit: Unit = None,
@@ -194,6 +237,8 @@ def watch(
     webhook: WebHook = None,
     mqtt: Mqtt = None,
     tell: Tell = None,
+    line_protocol: LineProtocol = None,
+    prometheus: Prometheus = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -203,27 +248,57 @@ def watch(
     settings = _track_settings(
         read, workers, band, shaft, method, stages_from, false_alarms, acknowledge
     )
-    watching = monitoring.WatchSettings(
-        store=store,
-        machine=machine,
-        point=point,
-        sensor=sensor,
-        notifiers=monitoring.notifiers(command=on_alarm, webhook=webhook, mqtt=mqtt),
-        notify_states=_states(tell),
-        reuse_judgement=(results / PAGE).is_file(),
-        once=once,
-        poll_interval_s=every,
-        settle_time_s=settle,
-        overdue_after_s=expect,
-    )
+    tree = tree or monitoring.is_tree(folder, results)
+    display = _watch_display(SimpleNamespace(**locals()))
+    watching = _watch_settings(SimpleNamespace(**locals()))
     forecaster = series_forecaster(
         forecast, case_file, worn, emulator, workers=settings.workers, quiet=quiet
     )
-    watch_series = partial(monitoring.watch_folder, folder, results, settings, watching)
     updates = partial(
-        watch_series, case=contact_at(case_file), table=table_file, forecaster=forecaster
+        monitoring.watch_tree if tree else monitoring.watch_folder,
+        *(folder, results, settings, watching),
+        case=contact_at(case_file),
+        table=table_file,
+        forecaster=forecaster,
     )
-    end_with(_show_updates(updates, results, once=once, as_json=as_json, quiet=quiet))
+    _show_updates(updates, display, mqtt=mqtt, quiet=quiet)
+    end_with(display.state)
+
+
+def _watch_display(options: SimpleNamespace) -> WatchDisplay:
+    """Build the display of `watch` from its options."""
+    display = WatchDisplay(
+        options.results,
+        once=options.once,
+        tree=options.tree,
+        report_every_s=options.report_every,
+    )
+    display.as_json, display.quiet = options.as_json, options.quiet
+    display.telemetry = monitoring.Telemetry(options.line_protocol, options.prometheus)
+    display.without_lines = options.line_protocol == "-"
+    return display
+
+
+def _watch_settings(options: SimpleNamespace) -> "WatchSettings":
+    """Build the settings of `watch` from its options and display."""
+    display: WatchDisplay = options.display
+    return monitoring.WatchSettings(
+        store=options.store,
+        machine=options.machine,
+        point=options.point,
+        sensor=options.sensor,
+        notifiers=monitoring.notifiers(
+            command=options.on_alarm, webhook=options.webhook, mqtt=options.mqtt
+        ),
+        notify_states=_states(options.tell),
+        reuse_judgement=options.once and (options.tree or display.reports().current),
+        once=options.once,
+        poll_interval_s=options.every,
+        settle_time_s=options.settle,
+        overdue_after_s=options.expect,
+        keep_s=options.keep,
+        on_check=display.check,
+    )
 
 
 def _given(paths: list[Path] | None) -> list[Path]:
@@ -268,150 +343,37 @@ def _track_settings(
     )
 
 
-def _show_track(
-    tracked: "Track",
-    page: Path | None,
-    saved: list[Path],
-    store: Path | None,
+def _show_updates(
+    updates: "Callable[..., Generator[Update]]",
+    display: WatchDisplay,
     *,
-    as_json: bool,
+    mqtt: str | None,
     quiet: bool,
 ) -> None:
-    """Show the verdict of a track, its series and what was written."""
-    paths_written = saved if store is None else [*saved, store]
-    hint = ["  Add --report track.html for the page, --out track.csv for the table."]
-    show(
-        tracked.verdict(),
-        lambda: (
-            tracked.scalars()
-            | {
-                "report": None if page is None else str(page),
-                "written": [str(path) for path in paths_written],
-            }
-        ),
-        _series(tracked),
-        _searched(tracked),
-        written("  Written", *paths_written) if paths_written else hint,
-        as_json=as_json,
-        quiet=quiet,
-    )
-
-
-def _show_updates(
-    updates: "Callable[..., Iterator[Update]]",
-    results: Path,
-    *,
-    once: bool,
-    as_json: bool,
-    quiet: bool,
-) -> str:
-    """Write and show every update until Ctrl-C; return the state of the last."""
-    state = "cannot-tell"
-    with _reading_progress("watching ...", quiet=quiet) as step:
+    """Write and show every update until Ctrl-C."""
+    presence = None if mqtt is None or display.once else monitoring.Presence(mqtt)
+    with ExitStack() as stack:
+        step = stack.enter_context(_reading_progress("watching ...", quiet=quiet))
+        stack.enter_context(termination())
+        if presence is not None:
+            stack.callback(presence.close)
         try:
-            for update in updates(progress=step):
-                state = _show_update(update, results, as_json=as_json, quiet=quiet) or state
+            with closing(updates(progress=step)) as running:
+                for update in running:
+                    display.show(update)
+            display.telemetry.finish()
         except KeyboardInterrupt:
-            if once:
+            if display.once:
                 raise
-            print(
-                f"stopped; results are in {results}, and the next watch continues", file=sys.stderr
+            display.finish()
+            print_sentences(
+                [f"stopped; results are in {display.results}, and the next watch continues"]
             )
-    return state
 
 
 def _states(tell: str | None) -> "Sequence[AlarmState]":
     """Return the states of `--tell`, all by default."""
     return trend.ALARM_STATES if tell is None else cast("Sequence[AlarmState]", tell.split(","))
-
-
-def _show_update(update: "Update", results: Path, *, as_json: bool, quiet: bool) -> str | None:
-    """Write and show an update; return the alarm's state, None without any recording.
-
-    With `--json` each update is one JSON object on one line.
-    """
-    judgement = update.judgement or (None if update.track is None else update.track.scalars())
-    if update.track is not None:
-        _write(update.track, [results / "track.csv", results / "track.nc"], results / PAGE)
-    verdict = "No recording has arrived yet." if judgement is None else judgement["verdict"]
-    if update.waiting:
-        verdict += (
-            f" {update.waiting} more wait: they may still be written, or are not in the table yet."
-        )
-    values: dict[str, Any] = {"verdict": verdict} if judgement is None else dict(judgement)
-    arrived = [*dict.fromkeys(recording.file for recording in update.new)]
-    show(
-        verdict,
-        lambda: {**values, "new": arrived, "waiting": update.waiting, "results": str(results)},
-        [] if judgement is None else _arrived(update.new, values["recordings"], results),
-        as_json=as_json,
-        quiet=quiet,
-        a_line=True,
-    )
-    for sentence in update.failed:
-        print(sentence, file=sys.stderr)
-    return None if judgement is None else str(judgement["alarm"]["state"])
-
-
-def _arrived(new: "Sequence[Reading]", recordings: list[dict[str, Any]], results: Path) -> Block:
-    rows = {part["file"]: row for row in recordings for part in (row, *row["sensors"].values())}
-    selected = [quantity(key) for key in ("crf_hz", "severe_probability")]
-    for arrived in {reading.file: reading for reading in new}.values():
-        row = rows.get(arrived.file)
-        if row is None:
-            outcome = arrived.reason
-        elif not row["found"]:
-            outcome = f"no contact resonance: {row['reason']}"
-        else:
-            outcome = ", ".join(
-                f"{entry.short} {entry.text_in(row)}"
-                for entry in selected
-                if row[entry.key] is not None
-            )
-        yield f"  {Path(arrived.file).name}: {outcome}"
-    yield f"  {len(recordings)} recordings so far; results in {results}"
-
-
-def _write(tracked: "Track", out: Sequence[Path], page: Path | None) -> list[Path]:
-    saved = [tracked.save(path) for path in out]
-    return saved if page is None else [*saved, report.write_track_report(tracked, page)]
-
-
-def _series(tracked: "Track") -> Block:
-    """Yield one row per recording, in the order of x."""
-    selected = [quantity(key) for key in ("crf_hz", "crfa", "damping_ratio", "severe_probability")]
-    rows = [
-        [
-            Path(row["file"]).name,
-            NO_VALUE if row["x"] is None else f"{row['x']:.4g}",
-            *(entry.number_in(row) if row["found"] else NO_VALUE for entry in selected),
-            "" if row["found"] else f"not found: {row['reason']}",
-        ]
-        for row in tracked.scalars()["recordings"]
-    ]
-    titles = ["recording", tracked.x_name, *(entry.label for entry in selected), ""]
-    yield from columns(titles, rows, left=1)
-
-
-def _searched(tracked: "Track") -> Block:
-    rows: list[Row] = [
-        (quantity("band_hz").title, span("band_hz", tracked.target.band_hz)),
-        ("method", tracked.method),
-        *tracked.stage_rows(),
-        ("alarm", tracked.alarm.verdict),
-        *_states_rows(tracked),
-        ("severity, last recording", tracked.recordings[-1].severity()),
-    ]
-    yield from table(rows, (*tracked.problems, *tracked.notes))
-
-
-def _states_rows(tracked: "Track") -> list[Row]:
-    """Return rows of the states of contact, level and sensor."""
-    scalars = tracked.scalars(all_sources=False)
-    return [
-        (name, ": ".join(filter(None, (scalars[name]["state"], scalars[name]["reason"]))))
-        for name in ("contact", "level", "sensor")
-    ]
 
 
 @contextmanager

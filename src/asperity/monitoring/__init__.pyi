@@ -10,10 +10,13 @@ from .files import RecordingPlace as RecordingPlace
 from .files import RecordingTable as RecordingTable
 from .files import read_table as read_table
 from .files import recordings_in as recordings_in
+from .fleet.telemetry import Telemetry as Telemetry
+from .fleet.tree_watch import is_tree as is_tree
 from .forecast import FORECAST as FORECAST
 from .forecast import Bands as Bands
 from .forecast import Forecaster as Forecaster
 from .forecast import ForecastResult as ForecastResult
+from .notify import Presence as Presence
 from .notify import notifiers as notifiers
 from .operating_point import ZERO_CELSIUS as ZERO_CELSIUS
 from .operating_point import OperatingPoint as OperatingPoint
@@ -22,6 +25,7 @@ from .overalls.judge import OverallTrack as OverallTrack
 from .overalls.judge import track_overalls as track_overalls
 from .overalls.table import OverallValues as OverallValues
 from .overalls.table import read_overalls as read_overalls
+from .overview import SEVERITY as SEVERITY
 from .overview import StoreOverview as StoreOverview
 from .overview import acknowledge_in as acknowledge_in
 from .overview import keep_track as keep_track
@@ -40,4 +44,5 @@ from .target import search_target as search_target
 from .track import track_recordings as track_recordings
 from .track_result import Track as Track
 from .watch import watch_folder as watch_folder
+from .watch import watch_tree as watch_tree
 from .watch_state import Update as Update

@@ -11,13 +11,15 @@ import shutil
 import signal
 import subprocess
 from base64 import b64encode
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from hashlib import sha256
 from tempfile import TemporaryFile
 from threading import Thread
 from time import time
+from typing import TYPE_CHECKING
 from urllib.parse import SplitResult, unquote, urlsplit
 
 from asperity.core.documents import JsonObject
@@ -25,6 +27,9 @@ from asperity.core.errors import BadInput
 from asperity.core.third_party import first_line
 from asperity.monitoring.settings import Notifier
 from asperity.monitoring.store.sensors import Sensors
+
+if TYPE_CHECKING:
+    from paho.mqtt.client import MQTTMessageInfo
 
 COMMAND_S, NETWORK_S = 30.0, 10.0  # time limits [s]
 RETRY_S, MAX_RETRY_S = 5.0, 3600.0  # first interval between attempts, doubled up to the second [s]
@@ -98,26 +103,35 @@ class Webhook:
 
     def send(self, notification: JsonObject) -> None:
         """Post the JSON; raise NotificationFailed for another status, OSError without an answer."""
-        from urllib.error import HTTPError
-        from urllib.request import HTTPRedirectHandler, Request, build_opener
+        content = json.dumps(notification).encode()
+        post(self.url, content, {"Content-Type": "application/json"})
 
-        class NoRedirect(HTTPRedirectHandler):
-            def redirect_request(self, *_: object) -> None:
-                return None  # a redirected post becomes a get without content
 
-        parts = urlsplit(self.url)
-        headers = {"Content-Type": "application/json"}
-        if parts.username:
-            credentials = f"{unquote(parts.username)}:{unquote(parts.password or '')}".encode()
-            headers["Authorization"] = f"Basic {b64encode(credentials).decode()}"
-        request = Request(
-            _without_credentials(parts), json.dumps(notification).encode(), headers, method="POST"
-        )
-        try:
-            build_opener(NoRedirect).open(request, timeout=NETWORK_S).close()
-        except HTTPError as error:
-            error.close()
-            raise NotificationFailed(f"it answered {error.code} {error.reason}") from None
+def post(url: str, content: bytes, headers: Mapping[str, str]) -> None:
+    """Post content to a web address, with its user and password if it has them.
+
+    Raises NotificationFailed for a status other than 200 to 299, OSError without an answer.
+    """
+    from urllib.error import HTTPError
+    from urllib.request import HTTPRedirectHandler, Request, build_opener
+
+    class NoRedirect(HTTPRedirectHandler):
+        def redirect_request(self, *_: object) -> None:
+            return None  # a redirected post becomes a get without content
+
+    parts = urlsplit(url)
+    authorization = {}
+    if parts.username:
+        credentials = f"{unquote(parts.username)}:{unquote(parts.password or '')}".encode()
+        authorization = {"Authorization": f"Basic {b64encode(credentials).decode()}"}
+    request = Request(
+        _without_credentials(parts), content, {**headers, **authorization}, method="POST"
+    )
+    try:
+        build_opener(NoRedirect).open(request, timeout=NETWORK_S).close()
+    except HTTPError as error:
+        error.close()
+        raise NotificationFailed(f"it answered {error.code} {error.reason}") from None
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,6 +180,43 @@ class Topic:
             client.loop_stop()
 
 
+class Presence:
+    """Retained status of a watch at an MQTT broker: online, or offline as its last will.
+
+    The topic is that of notifications with `/status`. A broken connection is made again.
+    """
+
+    def __init__(self, url: str) -> None:
+        from paho.mqtt import client as mqtt
+        from paho.mqtt.enums import CallbackAPIVersion
+
+        parts = urlsplit(url)
+        self.topic = f"{unquote(parts.path).strip('/') or 'asperity'}/status"
+        self._client = mqtt.Client(CallbackAPIVersion.VERSION2)
+        if parts.username:
+            self._client.username_pw_set(unquote(parts.username), unquote(parts.password or ""))
+        if parts.scheme == "mqtts":
+            self._client.tls_set()
+        self._client.will_set(self.topic, "offline", qos=1, retain=True)
+        self._client.on_connect = self._announce
+        self._client.connect_async(parts.hostname or "", parts.port or MQTT_PORTS[parts.scheme])
+        self._client.loop_start()
+
+    def _announce(self, *_: object) -> None:
+        self._publish("online")
+
+    def _publish(self, status: str) -> "MQTTMessageInfo":
+        return self._client.publish(self.topic, status, qos=1, retain=True)
+
+    def close(self) -> None:
+        """Publish offline, as far as the broker can be reached, and end the connection."""
+        if self._client.is_connected():
+            with suppress(ValueError, RuntimeError):
+                self._publish("offline").wait_for_publish(NETWORK_S)
+        self._client.disconnect()
+        self._client.loop_stop()
+
+
 def _fingerprint(*words: str) -> str:
     """Return a digest that identifies a recipient without its passwords and tokens."""
     return sha256("\0".join(words).encode(errors="replace")).hexdigest()[:8]
@@ -206,10 +257,10 @@ def notifiers(
             )
         recipients.append(Command(tuple(arguments)))
     if webhook is not None:
-        _require_address(webhook, ("http", "https"), "https://alarms.example/hook")
+        require_address(webhook, ("http", "https"), "https://alarms.example/hook")
         recipients.append(Webhook(webhook))
     if mqtt is not None:
-        _require_address(mqtt, tuple(MQTT_PORTS), "mqtt://broker.example/plant/alarms")
+        require_address(mqtt, tuple(MQTT_PORTS), "mqtt://broker.example/plant/alarms")
         try:
             import paho.mqtt.client  # noqa: F401
         except ImportError:
@@ -223,7 +274,7 @@ def notifiers(
     return tuple(recipients)
 
 
-def _within(seconds: float, delivery: Callable[[], None]) -> None:
+def within(seconds: float, delivery: Callable[[], None]) -> None:
     """Run a delivery with a time limit: an answer may trickle in without end."""
     outcome: list[Exception | None] = []
 
@@ -244,7 +295,8 @@ def _within(seconds: float, delivery: Callable[[], None]) -> None:
         raise outcome[0]
 
 
-def _require_address(url: str, schemes: Sequence[str], example: str) -> None:
+def require_address(url: str, schemes: Sequence[str], example: str) -> None:
+    """Raise BadInput unless an address has a host and one of the schemes."""
     try:
         parts = urlsplit(url)
         fits = (
@@ -271,10 +323,11 @@ def deliver(
     failed = []
     for notifier in recipients:
         for pending in sensors.pending_notifications(notifier.name):
-            if not now and pending.due_s > time():
+            # one due after the longest interval was stored before the clock was set back
+            if not now and 0.0 < pending.due_s - time() <= MAX_RETRY_S:
                 break
             try:
-                _within(COMMAND_S + NETWORK_S, partial(notifier.send, json.loads(pending.text)))
+                within(COMMAND_S + NETWORK_S, partial(notifier.send, json.loads(pending.text)))
             except Exception as error:  # noqa: BLE001 (program or network of the user)
                 wait_s = min(RETRY_S * 2.0 ** min(pending.attempts, 20), MAX_RETRY_S)
                 sensors.notifications.record_attempt(

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Mapping, Sequence
+from itertools import accumulate
 from pathlib import Path
 from typing import NamedTuple
 
@@ -65,16 +66,27 @@ def order_recordings(
         stored = {key: sensors.stored(key) for key in series}
         return _match_sensors(stored, places, x_name, waits)
     first = [sensors.first_stored(key) for key in series]
+    stated_name = x_name
     x, x_name = x_of_recordings(
         [key.file for key in series],
         [recording.time for recording in first],
         [not recording.refused for recording in first],
         places,
-        x_name,
+        stated_name,
     )
+    if x_name == "recording" and not stated_name:  # deleted recordings count
+        x = _counting_deleted(x, [recording.gap for recording in first])
     return Order(
         [(key,) for key in sorted(series, key=lambda key: x[key.file])], x_name, x, places, waits
     )
+
+
+def _counting_deleted(x: Mapping[str, float], gaps: Sequence[int]) -> dict[str, float]:
+    """Return positions that include the recordings deleted before each one."""
+    return {
+        file: value + deleted
+        for (file, value), deleted in zip(x.items(), accumulate(gaps), strict=True)
+    }
 
 
 def _named_sensors(
@@ -188,8 +200,9 @@ def judged_window(order: Order, end: int, sensors: Sensors) -> list[FileVersion]
     recording that is not judged yet, and the one that raised the standing alarm.
     """
     instants = order.instants[:end]
-    chosen = {*range(end)}
-    if end > max_window():
+    stored = [number for number, keys in enumerate(instants) if sensors.complete(keys)]
+    chosen = {*stored}
+    if len(stored) > max_window():
         acknowledged = sensors.acknowledged
         standing = sensors.standing
         start = 0
@@ -201,9 +214,10 @@ def judged_window(order: Order, end: int, sensors: Sensors) -> list[FileVersion]
             )
             start = next(numbers, 0)
         unjudged = sensors.unjudged()
-        new = sum(unjudged.issuperset(keys) for keys in instants[-LATEST_JUDGED:])
-        latest = max(end - LATEST_JUDGED - max(new - 1, 0), 0)
-        chosen = {*range(start, min(start + FIRST_JUDGED, end)), *range(latest, end)}
+        new = sum(unjudged.issuperset(instants[number]) for number in stored[-LATEST_JUDGED:])
+        latest = LATEST_JUDGED + max(new - 1, 0)
+        after = [number for number in stored if number >= start]
+        chosen = {*after[:FIRST_JUDGED], *stored[-latest:]}
         if standing is not None:
             chosen |= {
                 number

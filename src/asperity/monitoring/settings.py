@@ -1,6 +1,6 @@
 """Settings of `track_recordings` and `watch_folder`; the command line builds them in one place."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Protocol
@@ -72,3 +72,5 @@ class WatchSettings:
     poll_interval_s: float = 5.0  # interval between checks of the folder [s]
     settle_time_s: float = 2.0  # time for which a file must be unchanged before it is read [s]
     overdue_after_s: float | None = None  # time without recordings until "blind" [s]; None: 5 usual
+    keep_s: float | None = None  # age from which recordings are thinned out [s]; None: never
+    on_check: Callable[[], None] | None = None  # called after each check of the folder

@@ -5,25 +5,22 @@ later. Of a long series the first and the latest recordings are judged; the othe
 judgement in the store.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import closing
-from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from time import sleep
 
 from asperity.case import Case, MachineCase
 from asperity.core.errors import BadInput, require_choice, require_positive
 from asperity.core.files import make_folder
-from asperity.monitoring.files import RecordingTable, natural_order, read_table
+from asperity.monitoring.fleet.tree_watch import TreeWatch
+from asperity.monitoring.folder_watch import FolderWatch
 from asperity.monitoring.forecast import Forecaster, ForecastSchedule
-from asperity.monitoring.notify import deliver
-from asperity.monitoring.ordering import file_name, order_recordings
 from asperity.monitoring.reading import Reading
 from asperity.monitoring.settings import TrackSettings, WatchSettings
-from asperity.monitoring.states import overdue_reason
-from asperity.monitoring.store.database import STORE, FileVersion
+from asperity.monitoring.store.database import STORE, Store
 from asperity.monitoring.store.sensor_lookup import open_sensors
-from asperity.monitoring.store.sensors import Sensors
 from asperity.monitoring.target import search_target
 from asperity.monitoring.watch_state import Update, WatchState
 from asperity.trend import ALARM_STATES
@@ -42,7 +39,7 @@ def watch_folder(
     table: str | Path | None = None,
     forecaster: Forecaster | None = None,
     progress: Callable[[Reading], None] | None = None,
-) -> Iterator[Update]:
+) -> Generator[Update]:
     """Yield an update at the start and whenever recordings have arrived.
 
     Parameters
@@ -61,92 +58,133 @@ def watch_folder(
         if the folder does not exist, a time is not positive, or settings differ from those with
         which the store was begun.
     """
+    folder = _checked(folder, watching)
+    make_folder(Path(out))
+    return _updates(
+        open_watch(
+            folder,
+            Store(watching.store or Path(out) / STORE),
+            settings,
+            watching,
+            case=case,
+            table=table,
+            forecaster=forecaster,
+            progress=progress,
+        )
+    )
+
+
+def watch_tree(
+    folder: str | Path,
+    out: str | Path,
+    settings: TrackSettings = TRACK_DEFAULTS,
+    watching: WatchSettings = WATCH_DEFAULTS,
+    *,
+    case: Case | MachineCase | None = None,
+    table: str | Path | None = None,
+    forecaster: Forecaster | None = None,
+    progress: Callable[[Reading], None] | None = None,
+) -> Generator[Update]:
+    """Yield updates of all subfolders that contain recordings, each a measuring point.
+
+    The first level of folders names the machine, the others the point. All are stored in one file.
+    A failure of one does not stop the others; an update names its `place`.
+
+    Parameters
+    ----------
+    folder : root of the tree; folders that appear later are watched, too
+    out, settings, watching, case, table, forecaster, progress : as `watch_folder`
+
+    Raises
+    ------
+    BadInput
+        as `watch_folder`, or if machine or point are named.
+    AsperityError
+        at the end of a single run, if a folder could not be evaluated.
+    """
+    if watching.machine is not None or watching.point is not None:
+        raise BadInput(
+            f"folders name machine and point in a tree, got {watching.machine or watching.point}; "
+            "omit it, or watch a single folder"
+        )
+    folder = _checked(folder, watching)
+    make_folder(Path(out))
+    open_place = partial(
+        open_watch,
+        settings=settings,
+        case=case,
+        table=table,
+        forecaster=forecaster,
+        progress=progress,
+    )
+    return _tree_updates(TreeWatch(folder, Path(out), watching, open_place))
+
+
+def _checked(folder: str | Path, watching: WatchSettings) -> Path:
+    """Return the folder in full; raise BadInput if it does not exist, or for a wrong setting."""
     if watching.overdue_after_s is not None:
         require_positive(
             "the time without a recording (`overdue_after_s`)", watching.overdue_after_s, "s"
         )
+    if watching.keep_s is not None:
+        require_positive("the age of recordings to keep (`keep_s`)", watching.keep_s, "s")
     for alarm_state in watching.notify_states:
         require_choice("tell", alarm_state, ALARM_STATES)
-    folder, out = Path(folder).resolve(), Path(out)
-    if not folder.is_dir():
+    if not Path(folder).is_dir():
         raise BadInput(f"{folder} is not a folder; name the folder where recordings arrive")
-    make_folder(out)
+    return Path(folder).resolve()
+
+
+def open_watch(
+    folder: Path,
+    store: Store,
+    settings: TrackSettings,
+    watching: WatchSettings,
+    *,
+    case: Case | MachineCase | None = None,
+    table: str | Path | None = None,
+    forecaster: Forecaster | None = None,
+    progress: Callable[[Reading], None] | None = None,
+) -> FolderWatch:
+    """Return the watch of one folder; other arguments as of `watch_folder`."""
     target = search_target(case, settings.band_hz)
-    sensors = open_sensors(
-        watching.store or out / STORE,
-        folder,
-        (watching.machine, watching.point, watching.sensor),
-        target,
-        settings.read_options,
+    reopen = partial(
+        open_sensors,
+        folder=folder,
+        names=(watching.machine, watching.point, watching.sensor),
+        target=target,
+        options=settings.read_options,
     )
+    sensors = reopen(store)
     sensors.notifications.notify_states = watching.notify_states
     state = WatchState(sensors, target, settings, watching, ForecastSchedule(forecaster))
-    return _updates(state, folder, table, progress)
+    return FolderWatch(state, folder, table, progress, reopen)
 
 
-def _updates(
-    state: WatchState,
-    folder: Path,
-    table_file: str | Path | None,
-    progress: Callable[[Reading], None] | None,
-) -> Iterator[Update]:
+def _updates(watch: FolderWatch) -> Generator[Update]:
     """Yield an update at the start and whenever recordings have arrived or are overdue."""
-    sensors = state.sensors
-    watching = state.watching
-    with closing(sensors.store):
-        first, overdue_before = True, ""
+    watching = watch.state.watching
+    with closing(watch):
         while True:
-            arrived, table, waiting = _arrivals(state, folder, table_file)
-            new = state.read(arrived, table, progress)
-            overdue = (
-                ""
-                if new or (first and state.settings.acknowledge)
-                else overdue_reason(sensors.arrivals(), watching.overdue_after_s)
-            )
-            judgement = sensors.record_overdue(overdue, state.recipients) if overdue else None
-            if judgement is None:
-                update = _update(state, table, new, first=first)
-            else:
-                failed = deliver(sensors, watching.notifiers, now=first)
-                update = None
-                if not overdue_before:
-                    track = state.overdue(
-                        order_recordings(_series(sensors), table, sensors), overdue
-                    )
-                    update = Update(new=(), track=track, judgement=judgement, failed=failed)
+            update = watch.check()
             if update is not None:
-                yield replace(update, waiting=waiting)
+                yield update
+            if watching.on_check is not None:
+                watching.on_check()
             if watching.once:
                 return
-            first = False
-            overdue_before = overdue
             sleep(watching.poll_interval_s)
 
 
-def _arrivals(
-    state: WatchState, folder: Path, table_file: str | Path | None
-) -> tuple[list[FileVersion], RecordingTable | None, int]:
-    """Return complete new files that the table contains, the table, and how many files wait."""
-    unread = state.unread(folder)
-    arrived = state.unchanged(unread)
-    table = None
-    if table_file is not None and (arrived or state.sensors.by_name):
-        table = read_table(table_file)
-        arrived = [key for key in arrived if table.row(Path(key.file)) is not None]
-    return arrived, table, len(unread) - len(arrived)
-
-
-def _update(
-    state: WatchState, table: RecordingTable | None, new: tuple[Reading, ...], *, first: bool
-) -> Update | None:
-    """Judge new recordings, or make a forecast that is due; send notifications that are due."""
-    if new or first:
-        return state.update(_series(state.sensors), table, new, first=first)
-    forecast = state.with_forecast()
-    failed = deliver(state.sensors, state.watching.notifiers)
-    return None if forecast is None else Update(new=(), track=forecast, failed=failed)
-
-
-def _series(sensors: Sensors) -> list[FileVersion]:
-    """Return the files of all recordings, in natural order of their names."""
-    return sorted(sensors.series(), key=lambda key: natural_order(file_name(key)))
+def _tree_updates(tree: TreeWatch) -> Generator[Update]:
+    """Yield the updates of all places, in turn."""
+    watching = tree.watching
+    with closing(tree):
+        while True:
+            yield from tree.check()
+            if watching.on_check is not None:
+                watching.on_check()
+            if watching.once:
+                tree.require_complete()
+                return
+            sleep(watching.poll_interval_s)

@@ -11,6 +11,7 @@ from time import monotonic, sleep, time
 from typing import Any
 
 from asperity.core.errors import BadInput
+from asperity.core.troubles import Troubles
 from asperity.monitoring.alarm import LAST
 from asperity.monitoring.files import RecordingTable, is_utf8, may_be_recording, natural_order
 from asperity.monitoring.forecast import ForecastSchedule
@@ -34,6 +35,7 @@ from asperity.monitoring.track_result import Track
 from asperity.recording import sidecar_names
 
 SUFFIXES = (".toml", ".json")  # of sidecars
+CACHE_FACTOR = 16  # memory of a watch over that of its spectra's densities, as measured
 STRIDE = 80  # recordings per judgement where many arrive at once
 
 
@@ -43,8 +45,10 @@ class Update:
 
     `track` is None as long as there is no recording, and where `judgement` is the stored last
     judgement, as `Track.scalars` returned it. An overdue sensor has both. `failed` are sentences on
-    failed notifications and on files that are left out or have to wait. `waiting` files may still
-    be written, or are not in the table yet.
+    failures that begin or end, and on files that are left out or have to wait; a `notice` has only
+    these. `address` names machine, point and sensor; `place` the first two in a tree of folders.
+    `waiting` files may still be
+    written, or are not in the table yet.
     """
 
     new: tuple[Reading, ...]
@@ -52,6 +56,9 @@ class Update:
     waiting: int = 0
     failed: tuple[str, ...] = ()
     judgement: Mapping[str, Any] | None = None
+    notice: bool = False
+    place: str = ""
+    address: tuple[str, str, str] = ("", "", "")
 
 
 def version_of(path: Path) -> FileVersion:
@@ -101,8 +108,27 @@ class WatchState:
         self._readings: dict[FileVersion, list[Reading]] = {}
         self._memory: SeriesMemory | None = None
         self._not_utf8: set[str] = set()
+        self.unreported: list[Reading] = []  # read, and not in an update yet
+        self.present: set[str] = set()  # files of the folder when it was last read
+        self.troubles = Troubles()
+        self._unreached: set[str] = set()  # recipients whose notification failed
         # files with a time of change in the future, and when they were first seen
         self._future: dict[FileVersion, float] = {}
+
+    @property
+    def cached_bytes(self) -> int:
+        """Memory for the spectra of the window, with cleaned and fitted ones [bytes]."""
+        return CACHE_FACTOR * sum(
+            reading.spectrum.density.nbytes
+            for of_file in self._readings.values()
+            for reading in of_file
+            if reading.spectrum is not None
+        )
+
+    def release(self) -> None:
+        """Release the spectra; the next judgement reads them from the store."""
+        self._readings = {}
+        self._memory = None
 
     @property
     def recipients(self) -> list[str]:
@@ -131,6 +157,7 @@ class WatchState:
                 entry.path, stamp if sidecar is None else f"{stamp} {stamps[sidecar][1]}"
             )
             versions.append(key)
+        self.present = {key.file for key in versions}
         new = [key for key in self.sensors.unread(versions) if may_be_recording(Path(key.file))]
         return sorted(new, key=lambda key: natural_order(file_name(key)))
 
@@ -164,10 +191,10 @@ class WatchState:
         keys: list[FileVersion],
         table: RecordingTable | None,
         progress: Callable[[Reading], None] | None,
-    ) -> tuple[Reading, ...]:
-        """Read files and store each reading at once."""
+    ) -> None:
+        """Read files, store each reading at once, and add it to `unreported`."""
         if not keys:
-            return ()
+            return
         paths = [Path(key.file) for key in keys]
         options = self.settings.read_options
         if self.sensors.spacing_hz is None:
@@ -184,10 +211,12 @@ class WatchState:
         )
         readings: dict[FileVersion, list[Reading]] = {key: [] for key in keys}
         for number, reading in numbered_readings:
-            self.sensors.add(keys[number], reading)
-            readings[keys[number]].append(reading)
+            if reading.refused and not _is_current(keys[number]):
+                continue  # removed, or its folder lost, while it was read
+            stored = self.sensors.add(keys[number], reading)
+            readings[keys[number]].append(stored)
+            self.unreported.append(stored)
         self._readings |= readings
-        return tuple(reading for of_file in readings.values() for reading in of_file)
 
     def update(
         self,
@@ -198,7 +227,6 @@ class WatchState:
         first: bool,
     ) -> Update:
         """Judge the series, or take the stored judgement if it is up to date, and notify."""
-        notifiers = self.watching.notifiers
         acknowledge = self.settings.acknowledge
         question = _digest(
             {**self.settings.judgement(), **self.schedule.question}, table, series, self.target
@@ -211,18 +239,28 @@ class WatchState:
         )
         if judgement is not None:
             self.sensors.queue_notifications(self.recipients, judgement)
-            failed = deliver(self.sensors, notifiers, now=True)
-            return Update(new=(), track=None, judgement=judgement, failed=failed)
+            self.deliver(now=True)
+            return Update(new=(), track=None, judgement=judgement)
         order = order_recordings(series, table, self.sensors)
         track = self.judge(order, len(new), question, acknowledge if first else None)
-        failed = (
-            *self.left_out(),
-            *order.waits,
-            *deliver(self.sensors, notifiers, now=first),
-        )
+        self.deliver(now=first)
         forecast = self.with_forecast()
-        failed += deliver(self.sensors, notifiers) if forecast is not None else ()
+        if forecast is not None:
+            self.deliver()
+        failed = (*self.left_out(), *order.waits)
         return Update(new=new, track=forecast or track, failed=failed)
+
+    def deliver(self, *, now: bool = False) -> None:
+        """Send notifications that are due, or with `now` all; state failures that begin or end."""
+        failed = deliver(self.sensors, self.watching.notifiers, now=now)
+        for name in self.recipients:
+            sentence = next((text for text in failed if text.startswith(f"{name} ")), "")
+            if sentence:
+                self.troubles.begin(name, sentence)
+                self._unreached.add(name)
+            elif name in self._unreached and not self.sensors.pending_notifications(name):
+                self.troubles.end(name, f"{name} has been notified")
+                self._unreached.remove(name)
 
     def judge(self, order: Order, new: int, question: str, acknowledge: str | None) -> Track | None:
         """Judge the series and store the judgement, after an acknowledgement; None if it is empty.

@@ -7,9 +7,10 @@ All writing is transactional (write-ahead log): a watch may be killed at any mom
 import json
 import sqlite3
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
+from time import monotonic
 from typing import Any, NamedTuple, TypeAlias
 
 from asperity.core.documents import JsonObject, Table
@@ -18,11 +19,18 @@ from asperity.core.files import require_writable
 from asperity.trend import AlarmState
 
 STORE = "asperity.db"
-VERSION = 4  # 1: no duration of recordings; 2: `learned` is a column of `sensor`; 3: no levels
+VERSION = 4  # 1: no duration of recordings; 2: `learned` is a column of `sensor`; 3: no `gap`
 BUSY_S = 30.0  # timeout while another process writes [s]
+MISSING_S = 60.0  # time after which a missing folder of the store is made again [s]
 REMEDY = "delete it, and its recordings are read again, or choose another store"
 LEARNED = "CREATE TABLE learned (sensor INTEGER PRIMARY KEY REFERENCES sensor, body BLOB NOT NULL)"
 LEVELS = "CREATE TABLE levels (sensor INTEGER PRIMARY KEY REFERENCES sensor, body TEXT NOT NULL)"
+# versions of files whose recordings were deleted, and the number deleted before a recording
+DROPPED = (
+    "CREATE TABLE dropped (sensor INTEGER NOT NULL REFERENCES sensor, file TEXT NOT NULL, "
+    "version TEXT NOT NULL, PRIMARY KEY (sensor, file, version)) WITHOUT ROWID"
+)
+GAP = "CREATE TABLE gap (recording INTEGER PRIMARY KEY REFERENCES recording, count INTEGER)"
 SCHEMA = f"""
 CREATE TABLE machine (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE);
 CREATE TABLE point (
@@ -33,6 +41,8 @@ CREATE TABLE sensor (
     settings TEXT NOT NULL, asked TEXT, said TEXT, since INTEGER, UNIQUE (point, name));
 {LEARNED};
 {LEVELS};
+{DROPPED};
+{GAP};
 CREATE TABLE recording (
     id INTEGER PRIMARY KEY, sensor INTEGER NOT NULL REFERENCES sensor, file TEXT NOT NULL,
     version TEXT NOT NULL, heard TEXT NOT NULL, started TEXT, duration REAL,
@@ -59,6 +69,10 @@ CREATE VIEW trend AS
     FROM recording JOIN sensor ON sensor.id = recording.sensor JOIN point ON point.id = sensor.point
         JOIN machine ON machine.id = point.machine;
 """
+
+
+class StoreUnavailable(AsperityError):
+    """A store that cannot be used at present, such as on a full disk; a retry may succeed."""
 
 
 Run: TypeAlias = Callable[..., sqlite3.Cursor]  # runs a statement in a transaction
@@ -90,7 +104,9 @@ class StandingAlarm(NamedTuple):
 class StoredRecording(NamedTuple):
     """Recording of the store: number, start (None if unknown) and state (None if not judged).
 
-    `refused` if it could not be read; `duration_s` is nan if unknown.
+    `refused` if it could not be read; `duration_s` is nan if unknown. `day` is that of its start or
+    arrival; `complete` if its spectrum is stored; `gap` is the number of recordings deleted
+    directly before it.
     """
 
     number: int
@@ -98,6 +114,9 @@ class StoredRecording(NamedTuple):
     state: AlarmState | None
     refused: bool
     duration_s: float
+    day: str = ""
+    complete: bool = True
+    gap: int = 0
 
 
 class Store:
@@ -111,14 +130,24 @@ class Store:
         if the file is not a store, or of a later version.
     """
 
-    def __init__(self, path: str | Path, *, make: bool = True) -> None:
+    def __init__(self, path: str | Path, *, make: bool = True, in_memory: bool = False) -> None:
         self.path = Path(path)
-        if not self.path.exists() and not make:
+        self._in_memory = in_memory
+        self._missing_since: float | None = None
+        if not (in_memory or make or self.path.exists()):
             raise UnreadableFile(f"{self.path} does not exist; check its name")
-        require_writable(self.path)
-        self._connection = sqlite3.connect(self.path, timeout=BUSY_S, isolation_level=None)
+        self._open()
+
+    def _open(self) -> None:
+        """Connect to the file; create its tables, or convert an older version."""
+        if not self._in_memory:
+            require_writable(self.path)
+        location = ":memory:" if self._in_memory else self.path
         with self._translated_errors():
+            self._connection = sqlite3.connect(location, timeout=BUSY_S, isolation_level=None)
             version = self._connection.execute("PRAGMA user_version").fetchone()[0]
+            if version == 0:
+                self._connection.execute("PRAGMA auto_vacuum = INCREMENTAL")
             self._connection.execute("PRAGMA journal_mode = WAL")
             self._connection.execute("PRAGMA foreign_keys = ON")
             if version == 0:
@@ -130,10 +159,62 @@ class Store:
                     f"{self.path} is a store of version {version}, this asperity writes {VERSION}; "
                     "update asperity, or choose another store"
                 )
+        self._file = None if self._in_memory else _file_number(self.path)
 
     def close(self) -> None:
         """Close the store and merge the write-ahead log into the file."""
         self._connection.close()
+
+    def require_present(self) -> None:
+        """Raise StoreUnavailable if the file was removed or replaced since it was opened."""
+        if not self._in_memory and _file_number(self.path) != self._file:
+            raise StoreUnavailable(
+                f"{self.path} was removed or replaced; restore it, or its folder {self.path.parent}"
+            )
+
+    def recover(self) -> None:
+        """Connect again if the file was removed or replaced.
+
+        A file missing in its folder is restored from the open connection. A missing folder is made
+        again after `MISSING_S`, because it may be moved back or mounted before.
+
+        Raises
+        ------
+        StoreUnavailable
+            if the folder is missing, or the file cannot be written.
+        """
+        if _file_number(self.path) == self._file:
+            self._missing_since = None
+            return
+        folder = self.path.parent
+        if not folder.is_dir():
+            if self._missing_since is None:
+                self._missing_since = monotonic()
+            if monotonic() - self._missing_since < MISSING_S or not folder.parent.is_dir():
+                self.require_present()
+            with self._translated_errors():
+                folder.mkdir()
+        if not self.path.exists():
+            self._restore()
+        former = self._connection
+        try:
+            self._open()
+        except BaseException:
+            self._connection = former
+            raise
+        former.close()
+        self._missing_since = None
+
+    def _restore(self) -> None:
+        """Write the content of the open connection to a new file."""
+        part = self.path.with_name(f".{self.path.name}.part")
+        part.unlink(missing_ok=True)
+        try:
+            with self._translated_errors(), closing(sqlite3.connect(part)) as copy:
+                self._connection.backup(copy)
+            part.replace(self.path)
+        finally:
+            part.unlink(missing_ok=True)
 
     def _create(self) -> None:
         with self.transaction() as run:
@@ -162,15 +243,17 @@ class Store:
                 run("PRAGMA user_version = 3")
             if run("PRAGMA user_version").fetchone()[0] == 3:
                 run(LEVELS)
+                run(DROPPED)
+                run(GAP)
                 run("PRAGMA user_version = 4")
 
     @contextmanager
     def _translated_errors(self) -> Iterator[None]:
         try:
             yield
-        except sqlite3.OperationalError as error:
+        except (sqlite3.OperationalError, OSError) as error:
             reason = "another program has locked it" if "locked" in str(error) else str(error)
-            raise AsperityError(
+            raise StoreUnavailable(
                 f"{self.path} cannot be used: {reason}; release it or free disk space, and retry"
             ) from error
         except sqlite3.DatabaseError as error:
@@ -185,10 +268,24 @@ class Store:
             self._connection.execute("BEGIN IMMEDIATE")
             try:
                 yield self._connection.execute
+                self._connection.execute("COMMIT")
             except BaseException:
-                self._connection.execute("ROLLBACK")
+                if self._connection.in_transaction:  # SQLite may have ended it on a full disk
+                    with suppress(sqlite3.OperationalError):
+                        self._connection.execute("ROLLBACK")
                 raise
-            self._connection.execute("COMMIT")
+
+    def shrink(self, share: float) -> None:
+        """Release free pages of the file where they are more than a share of it.
+
+        A store of an older version keeps them for later recordings.
+        """
+        with self._translated_errors():
+            free = self._connection.execute("PRAGMA freelist_count").fetchone()[0]
+            pages = self._connection.execute("PRAGMA page_count").fetchone()[0]
+            if free > share * pages:
+                # `execute` would release a single page
+                self._connection.executescript("PRAGMA incremental_vacuum")
 
     def read(self, query: str, *values: object) -> list[Any]:
         """Return the rows of a query."""
@@ -231,3 +328,12 @@ class Store:
                 "SELECT id, settings FROM sensor WHERE point = ? AND name = ?", values[:2]
             ).fetchone()
         return number, json.loads(stored)
+
+
+def _file_number(path: Path) -> tuple[int, int] | None:
+    """Return what identifies a file on this system; None if it does not exist."""
+    try:
+        status = path.stat()
+    except OSError:
+        return None
+    return status.st_dev, status.st_ino

@@ -4,8 +4,12 @@
 """
 
 import json
+from collections.abc import Collection
+from dataclasses import replace
 from datetime import UTC, datetime
 from math import nan
+
+import numpy as np
 
 from asperity.core.documents import Table
 from asperity.core.errors import BadInput, UnreadableFile
@@ -59,20 +63,14 @@ class Sensor:
                     "keep the former value, or choose another `out` or another sensor"
                 )
         rows = store.read(
-            "SELECT id, file, version, started, state, refused, duration FROM recording "
+            "SELECT file, version, id, started, heard, state, refused, duration, "
+            "length(reading) > 0, count FROM recording LEFT JOIN gap ON recording = id "
             "WHERE sensor = ? ORDER BY id",
             self.number,
         )
-        self.recordings = {
-            FileVersion(file, version): StoredRecording(
-                number,
-                datetime.fromisoformat(started) if started else None,
-                state,
-                bool(refused),
-                duration or nan,
-            )
-            for number, file, version, started, state, refused, duration in rows
-        }
+        self.recordings = {FileVersion(*row[:2]): _stored_recording(*row[2:]) for row in rows}
+        dropped = store.read("SELECT file, version FROM dropped WHERE sensor = ?", self.number)
+        self.dropped = {FileVersion(*names) for names in dropped}
         self.unjudged = {
             key for key, recording in self.recordings.items() if recording.state is None
         }
@@ -110,13 +108,15 @@ class Sensor:
                 (json.dumps(self.settings), self.number),
             )
 
-    def add(self, key: FileVersion, reading: Reading) -> None:
-        """Store the reading of a file."""
+    def add(self, key: FileVersion, reading: Reading) -> Reading:
+        """Store the reading of a file; return it as it is stored, in single precision."""
+        reading = _in_single_precision(reading)
         duration = None if reading.quality is None else reading.quality.duration_s
+        arrived = now()
         values = (
             self.number,
             *key,
-            now(),
+            arrived,
             reading.started,
             reading.refused,
             duration,
@@ -137,9 +137,15 @@ class Sensor:
             )
             (number,) = row.fetchone()
         self.recordings[key] = StoredRecording(
-            number, reading.time, None, reading.refused, nan if duration is None else duration
+            number,
+            reading.time,
+            None,
+            reading.refused,
+            nan if duration is None else duration,
+            (reading.started or arrived)[:10],
         )
         self.unjudged.add(key)
+        return _in_double_precision(reading)
 
     def set_state(self, key: FileVersion, state: AlarmState) -> None:
         """Set the alarm state at a recording."""
@@ -147,17 +153,49 @@ class Sensor:
         self.unjudged.discard(key)
 
     def reading(self, key: FileVersion) -> Reading | None:
-        """Return a stored reading; None, and delete it, if it is damaged."""
-        ((body,),) = self.store.read(
+        """Return a stored reading; None if it is not stored any more, or damaged and deleted."""
+        rows = self.store.read(
             "SELECT reading FROM recording WHERE id = ?", self.recordings[key].number
         )
+        body = rows[0][0] if rows else b""
+        if not body:
+            return None
         try:
-            return unpack_reading(body, f"a recording in {self.store.path}")
+            return _in_double_precision(unpack_reading(body, f"a recording in {self.store.path}"))
         except UnreadableFile:
             with self.store.transaction() as run:
                 run("DELETE FROM recording WHERE id = ?", (self.recordings.pop(key).number,))
             self.unjudged.discard(key)
             return None
+
+    def times(self) -> dict[FileVersion, datetime]:
+        """Return start or arrival of every recording, as UTC where no zone is known."""
+        rows = self.store.read(
+            "SELECT file, version, started, heard FROM recording WHERE sensor = ?", self.number
+        )
+        return {
+            FileVersion(file, version): _as_utc(datetime.fromisoformat(started or arrived))
+            for file, version, started, arrived in rows
+            if FileVersion(file, version) in self.recordings
+        }
+
+    def delete(self, run: Run, key: FileVersion) -> None:
+        """Delete a recording within a transaction; its file is not read again."""
+        number = self.recordings.pop(key).number
+        self.unjudged.discard(key)
+        self.dropped.add(key)
+        run("DELETE FROM gap WHERE recording = ?", (number,))
+        run("DELETE FROM recording WHERE id = ?", (number,))
+        run("INSERT OR IGNORE INTO dropped VALUES (?, ?, ?)", (self.number, *key))
+
+    def forget_dropped(self, run: Run, present: Collection[str]) -> None:
+        """Forget deleted recordings whose files are not in the folder any more."""
+        for key in [key for key in self.dropped if key.file not in present]:
+            self.dropped.remove(key)
+            run(
+                "DELETE FROM dropped WHERE sensor = ? AND file = ? AND version = ?",
+                (self.number, *key),
+            )
 
     def insert_judgement(self, run: Run, judgement: Table) -> None:
         """Insert a judgement, by names of columns, within a transaction."""
@@ -169,3 +207,48 @@ class Sensor:
 def now() -> str:
     """Return the present time (UTC) as the store writes it."""
     return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+def _stored_recording(
+    number: int,
+    started: str | None,
+    arrived: str,
+    state: AlarmState | None,
+    refused: int,
+    duration_s: float | None,
+    complete: int,
+    gap: int | None,
+) -> StoredRecording:
+    """Return a recording from the values of its row."""
+    return StoredRecording(
+        number=number,
+        time=datetime.fromisoformat(started) if started else None,
+        state=state,
+        refused=bool(refused),
+        duration_s=duration_s or nan,
+        day=(started or arrived)[:10],
+        complete=bool(complete),
+        gap=gap or 0,
+    )
+
+
+def _as_utc(time: datetime) -> datetime:
+    return time if time.tzinfo is not None else time.replace(tzinfo=UTC)
+
+
+def _in_single_precision(reading: Reading) -> Reading:
+    """Return a reading with its spectrum in single precision: half the size, error 6e-8."""
+    return _with_type(reading, np.float32)
+
+
+def _in_double_precision(reading: Reading) -> Reading:
+    """Return a reading with its spectrum in double precision."""
+    return _with_type(reading, np.float64)
+
+
+def _with_type(reading: Reading, kind: type[np.floating]) -> Reading:
+    """Return a reading whose spectrum has another type of numbers."""
+    if reading.spectrum is None:
+        return reading
+    spectrum = replace(reading.spectrum, density=reading.spectrum.density.astype(kind))
+    return replace(reading, spectrum=spectrum)

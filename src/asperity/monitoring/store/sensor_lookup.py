@@ -19,7 +19,7 @@ def settings_of(target: Target, options: ReadOptions) -> JsonObject:
 
 
 def open_sensors(
-    store: str | Path,
+    store: str | Path | Store,
     folder: Path,
     names: tuple[str | None, str | None, str | None],
     target: Target,
@@ -29,6 +29,7 @@ def open_sensors(
 
     Parameters
     ----------
+    store : its file, or an open store
     names : of machine, point and sensor; without machine and point, recordings of other folders
         are refused
     target, options : with which recordings are read
@@ -43,8 +44,9 @@ def open_sensors(
     )
     settings = settings_of(target, replace(options, channel=channel))
     settings |= {} if machine and point else {FOLDER: str(folder)}
+    opened = store if isinstance(store, Store) else Store(store)
     return Sensors(
-        Store(store), address, settings, channels=max(len(channels), 1), named=sensor is not None
+        opened, address, settings, channels=max(len(channels), 1), named=sensor is not None
     )
 
 

@@ -13,12 +13,7 @@ from typing import Any
 from asperity.core.documents import JsonObject, Table
 from asperity.core.errors import BadInput
 from asperity.monitoring.reading import Reading
-from asperity.monitoring.series_state import (
-    SeriesMemory,
-    StoredLevels,
-    pack_shared,
-    unpack_shared,
-)
+from asperity.monitoring.series_state import SeriesMemory, StoredLevels
 from asperity.monitoring.states import SILENCE
 from asperity.monitoring.store.database import (
     FileVersion,
@@ -27,6 +22,12 @@ from asperity.monitoring.store.database import (
     StandingAlarm,
     Store,
     StoredRecording,
+)
+from asperity.monitoring.store.memories import (
+    read_levels,
+    read_memory,
+    write_levels,
+    write_memory,
 )
 from asperity.monitoring.store.notification_queue import (
     NotificationQueue,
@@ -104,8 +105,13 @@ class Sensors:
 
     def unread(self, keys: Sequence[FileVersion]) -> list[FileVersion]:
         """Return the files of which not every channel has been read."""
-        recordings = [sensor.recordings for sensor in self._sensors()]
-        return [key for key in keys if sum(key in read for read in recordings) < self.channels]
+        sensors = [*self._sensors()]
+        return [
+            key
+            for key in keys
+            if sum(key in sensor.recordings or key in sensor.dropped for sensor in sensors)
+            < self.channels
+        ]
 
     def stored(self, key: FileVersion) -> dict[str, StoredRecording]:
         """Return the stored recordings of a file, by sensor."""
@@ -119,6 +125,15 @@ class Sensors:
         """Return the stored recording of a file on the first sensor that could read it."""
         stored = [sensor.recordings[key] for sensor in self._sensors() if key in sensor.recordings]
         return next((recording for recording in stored if not recording.refused), stored[0])
+
+    def complete(self, keys: Sequence[FileVersion]) -> bool:
+        """Tell whether the spectrum of any of the files is stored."""
+        return any(
+            sensor.recordings[key].complete
+            for key in keys
+            for sensor in self._sensors()
+            if key in sensor.recordings
+        )
 
     def readable_names(self, keys: Sequence[FileVersion]) -> set[str]:
         """Return the names of sensors that could read any of the files."""
@@ -169,9 +184,9 @@ class Sensors:
         for sensor in self._sensors():
             sensor.set_spacing(spacing_hz)
 
-    def add(self, key: FileVersion, reading: Reading) -> None:
-        """Store the reading of a file under the name of its sensor."""
-        self._registered(self._name_of(reading)).add(key, reading)
+    def add(self, key: FileVersion, reading: Reading) -> Reading:
+        """Store the reading of a file under the name of its sensor; return it as stored."""
+        return self._registered(self._name_of(reading)).add(key, reading)
 
     def holds(self, key: FileVersion, reading: Reading) -> bool:
         """Tell whether a sensor's reading of a file is stored."""
@@ -261,22 +276,13 @@ class Sensors:
 
     def series_memory(self) -> SeriesMemory:
         """Return what the series has in common; empty at first."""
-        if self._first is None:
-            return SeriesMemory()
-        stored = self.store.read(
-            "SELECT body, since FROM learned JOIN sensor ON sensor.id = learned.sensor "
-            "WHERE sensor = ?",
-            self._first.number,
+        return (
+            SeriesMemory() if self._first is None else read_memory(self.store, self._first.number)
         )
-        return unpack_shared(stored[0][0], stored[0][1] or 0) if stored else SeriesMemory()
 
     def levels(self) -> StoredLevels | None:
         """Return the memory of the levels; None before the first judgement."""
-        if self._first is None:
-            return None
-        query = "SELECT body FROM levels WHERE sensor = ?"
-        stored = self.store.read(query, self._first.number)
-        return StoredLevels(**json.loads(stored[0][0])) if stored else None
+        return None if self._first is None else read_levels(self.store, self._first.number)
 
     def record_judgement(
         self,
@@ -321,8 +327,9 @@ class Sensors:
                     (question, content, sensor.number),
                 )
             self._queue(run, recipients, notification_content(judgement, lines[-1]["file"]))
-            self._store_memory(run, memory)
-            self._store_levels(run, track)
+            if self._first is not None:
+                write_memory(run, self._first.number, memory)
+                write_levels(run, self._first.number, track)
         self._written = written
         for stored in rows:
             stored.sensor.set_state(stored.key, stored.state)
@@ -373,28 +380,6 @@ class Sensors:
             raised_by=self.standing.raised_by,
         )
         return replace(track, alarm=alarm)
-
-    def _store_memory(self, run: Run, memory: SeriesMemory | None) -> None:
-        """Store what the series has in common, where it is new."""
-        if memory is None or memory.shared is None or self._first is None:
-            return
-        number = self._first.number
-        run("UPDATE sensor SET since = ? WHERE id = ?", (memory.since, number))
-        if memory.since == 0:
-            run("DELETE FROM learned WHERE sensor = ?", (number,))
-            if not memory.moved:  # otherwise it covers only a part, and all is separated again
-                run("INSERT INTO learned VALUES (?, ?)", (number, pack_shared(memory.shared)))
-
-    def _store_levels(self, run: Run, track: Track) -> None:
-        """Store the memory of the levels for the next judgement."""
-        judged, monitors = track.alarm.level_memory
-        if self._first is None:
-            return
-        run("DELETE FROM levels WHERE sensor = ?", (self._first.number,))
-        if judged and monitors:
-            stored = StoredLevels(track.recordings[judged - 1].file, monitors)
-            content = json.dumps(stored._asdict())
-            run("INSERT INTO levels VALUES (?, ?)", (self._first.number, content))
 
     def arrivals(self) -> list[datetime]:
         """Return when the last recordings arrived."""

@@ -1,0 +1,1 @@
+"""Fleets: trees of watched folders, and outputs for time-series databases."""
