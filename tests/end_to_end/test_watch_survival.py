@@ -388,6 +388,19 @@ def test_reports_are_written_at_first_at_a_change_and_at_the_end(tmp_path):
 
 
 @pytest.mark.usefixtures("_page")
+def test_brief_reports_hold_no_evaluation_in_memory(tmp_path):
+    reports = WatchReports(tmp_path, 0.1, once=False, brief=True)
+    reports.add(Tracked())
+    (tmp_path / "track.csv").unlink()
+    reports.add(Tracked())
+    reports.write()
+    assert not (tmp_path / "track.csv").exists()
+    time.sleep(0.12)
+    reports.add(Tracked())
+    assert (tmp_path / "track.csv").exists()
+
+
+@pytest.mark.usefixtures("_page")
 def test_reports_are_written_at_intervals(tmp_path):
     reports = WatchReports(tmp_path, 0.1, once=False)
     reports.add(Tracked())

@@ -38,11 +38,15 @@ class WatchReports:
     """Tables and page of a watched folder.
 
     They are written at the first update, when the alarm's state changes, every `interval_s`, and
-    at the end. With `once` a failure is raised; otherwise it is stated and retried.
+    at the end. With `once` a failure is raised; otherwise it is stated and retried. With `brief`
+    an evaluation is not held in memory until its report is due; the next one is written.
     """
 
-    def __init__(self, results: Path, interval_s: float, *, once: bool) -> None:
+    def __init__(
+        self, results: Path, interval_s: float, *, once: bool, brief: bool = False
+    ) -> None:
         self.results, self.interval_s, self.once = results, interval_s, once
+        self.brief = brief
         self.troubles = Troubles()
         self._delay = RetryDelay(REPORT_RETRY_S)
         self._track: Track | None = None  # not written yet
@@ -63,6 +67,8 @@ class WatchReports:
         if track.alarm.state != self._state:
             self._state, self._next_s = track.alarm.state, 0.0
         self.write_due()
+        if self.brief and self._delay.failures == 0:
+            self._track = None
 
     def write_due(self) -> None:
         """Write the last evaluation if it is due."""
@@ -128,7 +134,9 @@ class WatchDisplay:
             if place and self.results.is_dir():
                 with suppress(OSError):
                     folder.mkdir(parents=True, exist_ok=True)
-            self._reports[place] = WatchReports(folder, self.interval_s, once=self.once)
+            self._reports[place] = WatchReports(
+                folder, self.interval_s, once=self.once, brief=self.tree
+            )
         return self._reports[place]
 
     def show(self, update: "Update") -> None:
@@ -184,7 +192,7 @@ class WatchDisplay:
             reports.write_due()
 
     def finish(self) -> None:
-        """Write the last evaluations; those of a tree for at most `END_S`."""
+        """Write the last evaluations that are in memory, for at most `END_S`."""
         end_s = monotonic() + END_S
         for reports in self._reports.values():
             if monotonic() < end_s:

@@ -290,7 +290,8 @@ class WatchState:
         track = self._judge_and_store(
             order, count, new, answered, afresh=afresh, recipients=self.recipients
         )
-        self._awaiting_forecast = (track, order, question)
+        if self.schedule.forecaster is not None:
+            self._awaiting_forecast = (track, order, question)
         return track
 
     def with_forecast(self) -> Track | None:
