@@ -23,7 +23,7 @@ from asperity.monitoring.reading import read_channels
 from asperity.monitoring.store.database import STORE
 from asperity.monitoring.store.sensor_lookup import open_sensors
 from asperity.monitoring.target import search_target
-from asperity.monitoring.watch_state import WatchState, version_of
+from asperity.monitoring.watching.watch_state import WatchState, version_of
 from asperity.recording import ReadOptions
 
 RATE, SAMPLES, BAND = 12e3, 12_000, (2000.0, 4000.0)

@@ -101,7 +101,9 @@ def test_judged_recordings_are_not_judged_again(asp, monkeypatch):
     snapshots("in", np.ones(10))
     first = asp("watch", "in", "--once", "--settle", "0", "--json")
     judged = []
-    monkeypatch.setattr("asperity.monitoring.watch_state.judge", lambda *_, **__: judged.append(1))
+    monkeypatch.setattr(
+        "asperity.monitoring.watching.watch_state.judge", lambda *_, **__: judged.append(1)
+    )
     second = asp("watch", "in", "--once", "--settle", "0", "--json")
     assert (judged, second[0]) == ([], first[0])
     before, after = json.loads(first[1]), json.loads(second[1])
@@ -167,7 +169,7 @@ def _count(store):
 def test_many_new_recordings_are_judged_one_after_another(tmp_path, monkeypatch):
     """An alarm long before the latest recordings is not missed, and remains."""
     monkeypatch.setattr("asperity.monitoring.ordering.LATEST", 16)
-    monkeypatch.setattr("asperity.monitoring.watch_state.STRIDE", 8)
+    monkeypatch.setattr("asperity.monitoring.watching.watch_state.STRIDE", 8)
     snapshots(tmp_path / "in", [*failing(), *np.ones(30)])
     (update,) = watch_folder(
         tmp_path / "in", tmp_path / "out", watching=WatchSettings(once=True, settle_time_s=0.0)

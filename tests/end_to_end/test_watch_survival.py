@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asperity.cli.watch_output import WatchReports
+from asperity.cli.monitored.watch_output import WatchReports
 from asperity.core.errors import AsperityError
 from asperity.monitoring import TrackSettings, WatchSettings
 from asperity.monitoring.store import database
@@ -177,7 +177,7 @@ def test_a_store_that_fails_while_it_is_thinned_loses_no_update(tmp_path, disk, 
 
     snapshots(tmp_path / "in", np.ones(9))
     watched = watch(tmp_path)
-    monkeypatch.setattr("asperity.monitoring.folder_watch.thin_store", fail)
+    monkeypatch.setattr("asperity.monitoring.watching.folder_watch.thin_store", fail)
     update = watched.check()
     assert (len(update.new), len(update.failed)) == (9, 1)
     disk.full = False
@@ -285,7 +285,7 @@ def test_a_failing_evaluation_is_stated_once_and_repeated(tmp_path, monkeypatch)
     def fail(*_, **__):
         raise ValueError("singular matrix")
 
-    monkeypatch.setattr("asperity.monitoring.watch_state.judge", fail)
+    monkeypatch.setattr("asperity.monitoring.watching.watch_state.judge", fail)
     (sentence,) = watched.check().failed
     assert "could not be checked (ValueError: singular matrix); the watch continues" in sentence
     assert watched.check() is None
@@ -338,7 +338,7 @@ def test_a_clock_that_jumps_neither_makes_blind_nor_delays_notifications(
     snapshots(tmp_path / "in", np.ones(9))
     watched = watch(tmp_path, notifiers=[recipient], overdue_after_s=0.5)
     watched.check()
-    monkeypatch.setattr("asperity.monitoring.folder_watch.datetime", Clock)
+    monkeypatch.setattr("asperity.monitoring.watching.folder_watch.datetime", Clock)
     monkeypatch.setattr(
         "asperity.monitoring.notify.time", lambda: time.time() + jump.total_seconds()
     )
@@ -364,7 +364,8 @@ class Tracked:
 @pytest.fixture
 def _page(monkeypatch):
     monkeypatch.setattr(
-        "asperity.cli.watch_output.report.write_track_report", lambda track, path: track.save(path)
+        "asperity.cli.monitored.watch_output.report.write_track_report",
+        lambda track, path: track.save(path),
     )
 
 
@@ -414,7 +415,7 @@ def test_reports_are_written_at_intervals(tmp_path):
 
 @pytest.mark.usefixtures("_page")
 def test_a_failing_report_is_stated_once_and_retried(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("asperity.cli.watch_output.REPORT_RETRY_S", 0.0)
+    monkeypatch.setattr("asperity.cli.monitored.watch_output.REPORT_RETRY_S", 0.0)
     reports = WatchReports(tmp_path / "absent", 3600.0, once=False)
     for _ in range(3):
         reports.add(Tracked())

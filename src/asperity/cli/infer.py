@@ -11,6 +11,7 @@ from asperity import inference, report, simulation
 from asperity import surface as surfaces
 from asperity.cli.app import app
 from asperity.cli.forecast import contacts_solved, emulated, require_forecast
+from asperity.cli.monitored.series import EXIT_CODES
 from asperity.cli.options import (
     AsJson,
     Band,
@@ -34,7 +35,6 @@ from asperity.cli.options import (
     require_output,
 )
 from asperity.cli.output import Block, columns, progress, show, table, written
-from asperity.cli.series import EXIT_CODES
 from asperity.core import processes
 from asperity.core.errors import BadInput, require_choice
 from asperity.core.quantities import quantity

@@ -12,6 +12,14 @@ import typer
 from asperity import monitoring, recording, trend
 from asperity.cli.app import app
 from asperity.cli.forecast import series_forecaster
+from asperity.cli.monitored.series import end_with, track_series
+from asperity.cli.monitored.track_output import show_track
+from asperity.cli.monitored.watch_output import (
+    WatchDisplay,
+    print_sentences,
+    termination,
+    write_track,
+)
 from asperity.cli.options import (
     Acknowledge,
     AsJson,
@@ -46,14 +54,6 @@ from asperity.cli.options import (
     require_output,
 )
 from asperity.cli.output import progress
-from asperity.cli.series import end_with, track_series
-from asperity.cli.track_output import show_track
-from asperity.cli.watch_output import (
-    WatchDisplay,
-    print_sentences,
-    termination,
-    write_track,
-)
 from asperity.core import files, processes
 from asperity.core.errors import BadInput
 

@@ -7,9 +7,9 @@ import typer
 
 from asperity import monitoring
 from asperity.cli.app import app
+from asperity.cli.monitored.series import EXIT_CODES
 from asperity.cli.options import AsJson, Quiet, require_output
 from asperity.cli.output import columns, show, written
-from asperity.cli.series import EXIT_CODES
 from asperity.core.quantities import NO_VALUE
 
 

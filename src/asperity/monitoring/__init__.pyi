@@ -45,4 +45,4 @@ from .track import track_recordings as track_recordings
 from .track_result import Track as Track
 from .watch import watch_folder as watch_folder
 from .watch import watch_tree as watch_tree
-from .watch_state import Update as Update
+from .watching.watch_state import Update as Update

@@ -14,7 +14,7 @@ from asperity.monitoring.store.database import SensorAddress, Store
 from asperity.monitoring.store.sensor import ACKNOWLEDGED
 from asperity.monitoring.store.sensor_lookup import open_sensors, sensors_judged_with
 from asperity.monitoring.track_result import Track, flat
-from asperity.monitoring.watch_state import version_of
+from asperity.monitoring.watching.watch_state import version_of
 from asperity.recording import ReadOptions
 
 if TYPE_CHECKING:

@@ -15,14 +15,14 @@ from asperity.case import Case, MachineCase
 from asperity.core.errors import BadInput, require_choice, require_positive
 from asperity.core.files import make_folder
 from asperity.monitoring.fleet.tree_watch import TreeWatch
-from asperity.monitoring.folder_watch import FolderWatch
 from asperity.monitoring.forecast import Forecaster, ForecastSchedule
 from asperity.monitoring.reading import Reading
 from asperity.monitoring.settings import TrackSettings, WatchSettings
 from asperity.monitoring.store.database import STORE, Store
 from asperity.monitoring.store.sensor_lookup import open_sensors
 from asperity.monitoring.target import search_target
-from asperity.monitoring.watch_state import Update, WatchState
+from asperity.monitoring.watching.folder_watch import FolderWatch
+from asperity.monitoring.watching.watch_state import Update, WatchState
 from asperity.trend import ALARM_STATES
 
 TRACK_DEFAULTS = TrackSettings()

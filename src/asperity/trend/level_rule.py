@@ -11,7 +11,7 @@ from collections import Counter
 from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 from statistics import median
-from typing import Any, Literal, NamedTuple, cast
+from typing import Literal, NamedTuple, cast
 
 import scipy
 
@@ -117,14 +117,16 @@ class LevelMonitor:
         """Return the monitor of a stored memory."""
         bins = cast("dict[str, int]", stored["bins"])
         latest = cast("list[tuple[float, int]]", stored["latest"])
-        finding = cast("tuple[LevelState, str]", stored["finding"])
+        state, evidence = cast("tuple[LevelState, str]", stored["finding"])
         return cls(
-            **cast("dict[str, Any]", stored)
-            | {
-                "bins": Counter({int(number): count for number, count in bins.items()}),
-                "latest": [(level, passed) for level, passed in latest],
-                "finding": LevelFinding(*finding),
-            }
+            count=cast("int", stored["count"]),
+            baseline=cast("float", stored["baseline"]),
+            early=cast("list[float]", stored["early"]),
+            bins=Counter({int(number): count for number, count in bins.items()}),
+            latest=[(level, passed) for level, passed in latest],
+            before=cast("int", stored["before"]),
+            exceeded=cast("list[int]", stored["exceeded"]),
+            finding=LevelFinding(state, evidence),
         )
 
     def _add_to_baseline(self, level: float) -> None:

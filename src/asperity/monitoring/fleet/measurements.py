@@ -8,7 +8,7 @@ from time import time_ns
 
 from asperity.core.documents import JsonObject
 from asperity.monitoring.overview import SEVERITY
-from asperity.monitoring.watch_state import Update
+from asperity.monitoring.watching.watch_state import Update
 
 STATE_CODES = {state: code for code, state in enumerate(reversed(SEVERITY))}  # 0: healthy
 FIELDS = {  # key of a row, and name of the field

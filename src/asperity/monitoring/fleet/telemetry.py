@@ -9,7 +9,7 @@ from asperity.core.troubles import RetryDelay, Troubles, failure_reason
 from asperity.monitoring.fleet.line_protocol import LineProtocol
 from asperity.monitoring.fleet.measurements import Measurement, heartbeat_of, measurements_of
 from asperity.monitoring.fleet.prometheus import PrometheusFile
-from asperity.monitoring.watch_state import Update
+from asperity.monitoring.watching.watch_state import Update
 
 HEARTBEAT_S = 60.0  # interval between heartbeats [s]
 RETRY_S = 5.0  # first delay before a failed output is written again [s]

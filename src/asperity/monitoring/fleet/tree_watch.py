@@ -9,10 +9,10 @@ from time import monotonic
 from asperity.core.errors import AsperityError
 from asperity.core.troubles import Troubles, failure_reason
 from asperity.monitoring.files import is_utf8, may_be_recording, natural_order
-from asperity.monitoring.folder_watch import FolderWatch
 from asperity.monitoring.settings import WatchSettings
 from asperity.monitoring.store.database import STORE, Store
-from asperity.monitoring.watch_state import Update
+from asperity.monitoring.watching.folder_watch import FolderWatch
+from asperity.monitoring.watching.watch_state import Update
 
 RESULTS = "asperity-watch"  # folder of results, by default
 SEARCH_S = 60.0  # interval between searches for new folders [s]

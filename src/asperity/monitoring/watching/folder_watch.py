@@ -17,7 +17,7 @@ from asperity.monitoring.store.database import FileVersion, Store, StoreUnavaila
 from asperity.monitoring.store.memory_copy import MemoryCopy
 from asperity.monitoring.store.retention import thin_store
 from asperity.monitoring.store.sensors import Sensors
-from asperity.monitoring.watch_state import Update, WatchState
+from asperity.monitoring.watching.watch_state import Update, WatchState
 
 THIN_AFTER = 32  # recordings after which the store is thinned again
 FOLDER, STORE, CHECK = "folder", "store", "check"  # causes of failures

@@ -1,0 +1,1 @@
+"""Output of `asperity track` and `watch`."""

@@ -1,0 +1,1 @@
+"""Watch of one folder: its state, and its updates as recordings arrive."""
