@@ -12,7 +12,7 @@ import typer
 from asperity import monitoring, recording, trend
 from asperity.cli.app import app
 from asperity.cli.forecast import series_forecaster
-from asperity.cli.monitored.series import end_with, track_series
+from asperity.cli.monitored.series import end_with, track_series, watch_series
 from asperity.cli.monitored.track_output import show_track
 from asperity.cli.monitored.watch_output import (
     WatchDisplay,
@@ -78,7 +78,7 @@ SeriesTable = Annotated[
     ),
 ]
 WatchedFolder = Annotated[
-    Path, typer.Argument(metavar="DIR", help="Folder where recordings arrive.")
+    Path, typer.Argument(metavar="DIR", help="Folder where recordings arrive, or a table.")
 ]
 ResultFolder = Annotated[
     Path | None, typer.Option(metavar="DIR", help="Folder of results; default: DIR/asperity-watch.")
@@ -243,6 +243,9 @@ def watch(
     quiet: Quiet = False,
 ) -> None:
     """Track recordings as they arrive in a folder, until Ctrl-C; a later watch continues it."""
+    if folder.is_file():
+        watch_series(SimpleNamespace(**locals()), _states(tell))
+        return
     results = out or folder / "asperity-watch"
     read = recording.ReadOptions(rate_hz=rate, unit=unit, channel=channel, scale=scale)
     settings = _track_settings(

@@ -25,6 +25,8 @@ from .overalls.judge import OverallTrack as OverallTrack
 from .overalls.judge import track_overalls as track_overalls
 from .overalls.table import OverallValues as OverallValues
 from .overalls.table import read_overalls as read_overalls
+from .overalls.watch import OverallUpdate as OverallUpdate
+from .overalls.watch import watch_overalls as watch_overalls
 from .overview import SEVERITY as SEVERITY
 from .overview import StoreOverview as StoreOverview
 from .overview import acknowledge_in as acknowledge_in

@@ -1,7 +1,10 @@
 """`asperity track --series`: a table of time stamps and overall values; exit codes of states."""
 
+import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import typer
@@ -12,7 +15,8 @@ from asperity.core.errors import BadInput
 from asperity.core.quantities import NO_VALUE
 
 if TYPE_CHECKING:
-    from asperity.monitoring import OverallTrack
+    from asperity.monitoring import OverallTrack, OverallUpdate
+    from asperity.trend import AlarmState
 
 EXIT_CODES = {"alarm": 3, "cannot-tell": 4, "blind": 5}  # by state of the alarm; otherwise 0
 LAST_ROWS = 10  # that are shown
@@ -49,6 +53,58 @@ def track_series(
         quiet=quiet,
     )
     end_with(judged.state)
+
+
+def watch_series(options: SimpleNamespace, notify_states: "Sequence[AlarmState]") -> None:
+    """Judge a table of overall values at each change, and end with the code of its last state."""
+    unused = {
+        "--table": options.table_file,
+        "--case": options.case_file,
+        "--forecast": options.forecast,
+        "--store": options.store,
+        "--keep": options.keep,
+    }
+    for name, value in unused.items():
+        if value is not None:
+            raise BadInput(f"{name} does not apply to a table of overall values; leave it out")
+    watching = monitoring.WatchSettings(
+        machine=options.machine,
+        point=options.point,
+        sensor=options.sensor,
+        notifiers=monitoring.notifiers(
+            command=options.on_alarm, webhook=options.webhook, mqtt=options.mqtt
+        ),
+        notify_states=notify_states,
+        once=options.once,
+        poll_interval_s=options.every,
+        settle_time_s=options.settle,
+    )
+    out = options.out or options.folder.parent / "asperity-watch"
+    state = "cannot-tell"
+    with suppress(KeyboardInterrupt):
+        for update in monitoring.watch_overalls(
+            options.folder, out, watching, acknowledge=options.acknowledge
+        ):
+            state = _show_overall_update(update, options) or state
+    end_with(state)
+
+
+def _show_overall_update(update: "OverallUpdate", options: SimpleNamespace) -> str | None:
+    """Show an update; return the state, None if the table has not changed."""
+    for sentence in update.failed:
+        print(sentence, file=sys.stderr)
+    track = update.track
+    if track is None:
+        return None
+    show(
+        track.verdict(),
+        lambda: track.scalars(rows=False),
+        [],
+        as_json=options.as_json,
+        quiet=options.quiet,
+        a_line=True,
+    )
+    return track.state
 
 
 def _overall_rows(judged: "OverallTrack") -> Block:

@@ -62,14 +62,19 @@ class OverallTrack:
         }[self.state]
         return f"{start}: {self.reason}."
 
-    def scalars(self) -> JsonObject:
-        """Return the JSON of `asperity track --series`."""
+    @property
+    def last_place(self) -> str:
+        """Time stamp or x of the last row, as text."""
+        return self._place(len(self.states) - 1)
+
+    def scalars(self, *, rows: bool = True) -> JsonObject:
+        """Return the JSON of `asperity track --series`, if requested with all rows."""
         since = None if self.since is None else self._place(self.since)
         alarm = {"state": self.state, "since": since, "reason": self.reason}
         leveled = self.state in ("alert", "alarm")
         return {
             "verdict": self.verdict(),
-            "recordings": self.rows(),
+            "recordings": self.rows() if rows else [],
             "alarm": {**alarm, "raised_by": self.raised_by or None, "causes": self.causes},
             "contact": {"state": "not-seen", "reason": NO_SPECTRUM},
             "level": {
