@@ -39,6 +39,7 @@ SOURCES = [
         for name in (
             "alarm",
             "alarm_inputs",
+            "decision",
             "level_monitors",
             "level_rule",
             "sequential",

@@ -84,7 +84,31 @@ def test_the_baseline_settles_with_the_level_and_does_not_grow_with_it():
 def test_an_alert_needs_more_than_the_scatter_of_the_level():
     daily = 0.55 * np.sin(2.0 * np.pi * np.arange(1500) / 144.0) + noise(9, 1500)
     assert "alarm" not in states(daily)
-    assert "alert" not in states(daily[400:])
+    assert "alert" not in states(daily[400:])[200:]  # learned from the first cycle
+
+
+@pytest.mark.parametrize("factor", [2.3, 3.0])
+@pytest.mark.parametrize("healthy", [12, 20, 60])
+def test_an_alert_stands_while_the_level_does(factor, healthy):
+    """Raised values enter neither baseline nor scatter, also of a fault after few recordings."""
+    levels = noise(21, healthy + 400)
+    levels[healthy:] += np.log(factor)
+    monitor = LevelMonitor()
+    found = [monitor.update(float(level)).state for level in levels]
+    assert found[healthy + 4 :] == ["alert"] * (len(levels) - healthy - 4)
+    assert np.exp(monitor.rise) == pytest.approx(factor, rel=0.25)
+
+
+def test_an_explained_rise_does_not_alarm_when_it_has_ended():
+    levels = noise(22, 80)
+    levels[30:36] += np.log(5.0)
+    monitor = LevelMonitor()
+    found = []
+    for level in levels:
+        found.append(monitor.update(float(level)).state)
+        if found[-1] != "none" and len(found) < 45:
+            monitor.withhold()
+    assert set(found[45:]) == {"none"}
 
 
 def test_an_alert_ends_when_the_level_returns_and_an_alarm_does_not():

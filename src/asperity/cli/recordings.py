@@ -243,23 +243,23 @@ def watch(
     quiet: Quiet = False,
 ) -> None:
     """Track recordings as they arrive in a folder, until Ctrl-C; a later watch continues it."""
+    options = SimpleNamespace(**locals())
     if folder.is_file():
-        watch_series(SimpleNamespace(**locals()), _states(tell))
+        watch_series(options, _states(tell))
         return
-    results = out or folder / "asperity-watch"
+    options.results = results = out or folder / "asperity-watch"
     read = recording.ReadOptions(rate_hz=rate, unit=unit, channel=channel, scale=scale)
     settings = _track_settings(
         read, workers, band, shaft, method, stages_from, false_alarms, acknowledge
     )
-    tree = tree or monitoring.is_tree(folder, results)
-    display = _watch_display(SimpleNamespace(**locals()))
-    watching = _watch_settings(SimpleNamespace(**locals()))
+    options.tree = tree or monitoring.is_tree(folder, results)
+    options.display = display = _watch_display(options)
     forecaster = series_forecaster(
         forecast, case_file, worn, emulator, workers=settings.workers, quiet=quiet
     )
     updates = partial(
-        monitoring.watch_tree if tree else monitoring.watch_folder,
-        *(folder, results, settings, watching),
+        monitoring.watch_tree if options.tree else monitoring.watch_folder,
+        *(folder, results, settings, _watch_settings(options)),
         case=contact_at(case_file),
         table=table_file,
         forecaster=forecaster,

@@ -351,7 +351,9 @@ class SpurGear:
                     "lower the tip diameters",
                 )
             )
-            raise BadInput(f"the contact ratio is {self.contact_ratio:.3f}: {cause}; {remedy}")
+            raise BadInput(
+                f"the transverse contact ratio is {self.contact_ratio:.3f}: {cause}; {remedy}"
+            )
 
     def _require_root_clearance(self) -> None:
         """Raise BadInput if tips of standard length interfere with the roots."""

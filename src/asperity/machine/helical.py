@@ -66,9 +66,14 @@ class HelicalGear(SpurGear):
         low, high = HELIX_ANGLES
         degrees = math.degrees(self.helix_angle)
         if not low <= degrees <= high:
+            remedy = (
+                f"below {low:g} deg use a spur gear"
+                if 0.0 <= degrees < low
+                else "give it without its hand"
+            )
             raise BadInput(
                 f"helix_angle must lie between {low:g} and {high:g} deg, got {degrees:g} deg; "
-                f"below {low:g} deg use a spur gear"
+                f"{remedy}"
             )
         super().__post_init__()
 

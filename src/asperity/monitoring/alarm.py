@@ -282,10 +282,11 @@ def _level_indicators(
         level
         for sensor in sensors
         for level in _levels_on_sensor(
-            sensor if several else "",
+            sensor,
             [recording.readings.get(sensor) for recording in tracked],
             tracked,
             response,
+            several=several,
         )
     ]
 
@@ -295,6 +296,8 @@ def _levels_on_sensor(
     readings: Sequence[Reading | None],
     tracked: Sequence[TrackedRecording],
     response: Response,
+    *,
+    several: bool,
 ) -> list[MonitoredSeries]:
     """Return the indicators of a sensor, from recordings in its most frequent unit."""
     unit = _usual_unit(readings)
@@ -316,14 +319,15 @@ def _levels_on_sensor(
     }
     return [
         MonitoredSeries(
-            name=f"{label} on {sensor}" if sensor else label,
+            name=f"{label} on {sensor}" if several else label,
+            key=f"{sensor}: {label} [{unit}]",
             values=values,
             smallest_change=LEVEL_LEAST,
             contact=False,
             describe=ratio_text,
             gain_dependent=label not in depths and label != KURTOSIS,
             step_alarms=label in depths,
-            sensor=sensor,
+            sensor=sensor if several else "",
             conditions=pulse_conditions
             if label in depths or label in lines or label == KURTOSIS
             else level_conditions,

@@ -64,22 +64,27 @@ def level_state(alarm: Alarm, recordings: Sequence[TrackedRecording]) -> JsonObj
     }
 
 
-def causes(alarm: Alarm, recordings: Sequence[TrackedRecording]) -> list[str]:
-    """Return the kinds of causes that are active: contact, level, zone, silence."""
+def causes(alarm: Alarm, recordings: Sequence[TrackedRecording], silent: str = "") -> list[str]:
+    """Return the kinds of causes that are active: contact, level, silence, zone."""
     kinds = {"level"} if alarm.level.state != "none" else set()
+    named = {ZONE: ZONE} | dict.fromkeys(CONTACT_SOURCES, "contact")
     if alarm.state in ("alert", "alarm"):
-        named = {SILENCE: "silence", ZONE: "zone"} | dict.fromkeys(CONTACT_SOURCES, "contact")
-        kinds.add(named.get(alarm.raised_by, "level"))
+        raised = filter(None, (alarm.raised_by, alarm.raised_since))
+        kinds |= {named.get(source, "level") for source in raised}
+    if silent:
+        kinds.add(SILENCE)
     if len(recordings) > 1 and all(recording.zone in ("C", "D") for recording in recordings[-2:]):
-        kinds.add("zone")
+        kinds.add(ZONE)
     return sorted(kinds)
 
 
-def sensor_state(alarm: Alarm, recordings: Sequence[TrackedRecording]) -> JsonObject:
+def sensor_state(
+    alarm: Alarm, recordings: Sequence[TrackedRecording], silent: str = ""
+) -> JsonObject:
     """Return whether the sensor delivers usable recordings, and why not."""
     last = recordings[-1]
-    if alarm.state == "blind":
-        return {"state": "blind", "reason": alarm.reason}
+    if alarm.state == "blind" or silent:
+        return {"state": "blind", "reason": silent or alarm.reason}
     if last.dead:
         return {"state": "blind", "reason": last.reading.reason}
     return {"state": "ok", "reason": ""}

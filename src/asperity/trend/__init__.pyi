@@ -1,5 +1,4 @@
 from .alarm import ALARM_STATES as ALARM_STATES
-from .alarm import ALERT_RATE_FACTOR as ALERT_RATE_FACTOR
 from .alarm import FALSE_ALARM_RATE as FALSE_ALARM_RATE
 from .alarm import Alarm as Alarm
 from .alarm import knee_weight as knee_weight
@@ -17,6 +16,7 @@ from .comparison import LoadShare as LoadShare
 from .comparison import RecordingFacts as RecordingFacts
 from .comparison import asperity_load_share as asperity_load_share
 from .comparison import comparability as comparability
+from .decision import ALERT_RATE_FACTOR as ALERT_RATE_FACTOR
 from .level_monitors import LevelJudgement as LevelJudgement
 from .level_monitors import LevelMonitors as LevelMonitors
 from .level_rule import ALARM_FACTOR as ALARM_FACTOR

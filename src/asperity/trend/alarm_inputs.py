@@ -49,6 +49,7 @@ class MonitoredSeries:
     conditions : operating conditions that may explain changes; same recordings
     relative : whether `values` are ratios; conditions then act on their logarithm
     sensor : name of the sensor, empty for a single one
+    key : identity in the memory of the levels, such as sensor, name and unit; default: the name
     """
 
     name: str
@@ -59,8 +60,14 @@ class MonitoredSeries:
     gain_dependent: bool = False
     step_alarms: bool = False
     sensor: str = ""
+    key: str = ""
     conditions: tuple[Condition, ...] = ()
     relative: bool = False
+
+    @property
+    def identity(self) -> str:
+        """Key in the memory of the levels."""
+        return self.key or self.name
 
     def part(self, rows: NDArray[np.intp]) -> "MonitoredSeries":
         """Return the series of some recordings."""

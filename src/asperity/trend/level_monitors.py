@@ -41,8 +41,8 @@ class LevelMonitors:
         stored = memory.monitors if memory.judged >= first else {}
         self._next = max(memory.judged, first) if stored else first
         self._monitors = {
-            series.name: LevelMonitor.from_json(stored[series.name])
-            if series.name in stored
+            series.identity: LevelMonitor.from_json(stored[series.identity])
+            if series.identity in stored
             else LevelMonitor()
             for series in self._levels
         }
@@ -58,31 +58,37 @@ class LevelMonitors:
         if number < self._next:
             return
         if number == self._last:
-            monitors = {name: monitor.to_json() for name, monitor in self._monitors.items()}
-            self.memory = LevelMemory(number, monitors)
+            monitors = {key: monitor.to_json() for key, monitor in self._monitors.items()}
+            self.memory = LevelMemory(number, {**self.memory.monitors, **monitors})
         for series in self._levels:
-            self._monitors[series.name].update(self._value(series, number))
+            self._monitors[series.identity].update(self._value(series, number))
         self._next = number + 1
 
     def judgement(self) -> LevelJudgement:
         """Return the most severe state of all levels after the recordings so far."""
-        rises = {name: monitor.rise for name, monitor in self._monitors.items()}
-        known = [name for name, rise in rises.items() if math.isfinite(rise)]
+        rises = {series.name: self._monitors[series.identity].rise for series in self._levels}
+        findings = {series.name: self._monitors[series.identity].finding for series in self._levels}
+        known = [series for series in self._levels if math.isfinite(rises[series.name])]
         if not known:
             return LevelJudgement()
-        name = max(
+        series = max(
             known,
-            key=lambda name: (STATES.index(self._monitors[name].finding.state), rises[name]),
+            key=lambda series: (STATES.index(findings[series.name].state), rises[series.name]),
         )
-        series = next(series for series in self._levels if series.name == name)
-        state, evidence = self._monitors[name].finding
-        words = f"{name} {series.describe(rises[name])}"
+        (state, evidence), rise = findings[series.name], rises[series.name]
+        words = f"{series.name} {series.describe(rise)}"
         if state == "none":
-            words = f"no level stays above its baseline; the highest, {name}, is "
-            words += f"{math.exp(rises[name]):.2g} times its baseline"
+            words = f"no level stays above its baseline; the highest, {series.name}, is "
+            words += f"{math.exp(rise):.2g} times its baseline"
         elif evidence:
             words = f"{words}, {evidence}"
-        return LevelJudgement(state, math.exp(rises[name]), name, words)
+        return LevelJudgement(state, math.exp(rise), series.name, words)
+
+    def withhold(self, name: str) -> None:
+        """End the finding of a level whose change something else explains."""
+        for series in self._levels:
+            if series.name == name:
+                self._monitors[series.identity].withhold()
 
     def _value(self, series: MonitoredSeries, number: int) -> float:
         """Return the level of a recording at the conditions of the baseline."""

@@ -25,7 +25,7 @@ RATE = 3e-6  # false alarms per recording of a level, if exceedances are indepen
 PRIOR_EXCEEDANCES, PRIOR_VALUES = 0.5, 40.0  # of the chance of an exceedance, before any is known
 LATEST, PRESENT = 30, 3  # recordings of the slow part, and of the present level
 ALERT_DEVIATIONS = 4.0  # of the scatter, that an alert exceeds too, up to the factor of an alarm
-BELOW_ONE_DEVIATION = 0.16  # share of a normal distribution
+BELOW_ONE_DEVIATION = 0.32  # share of the lower half of a normal distribution
 BIN = 0.05  # of the logarithmic level, in the distribution of all values
 HYSTERESIS = 0.8  # of the threshold of an alert, below which it ends
 
@@ -60,7 +60,7 @@ class LevelMonitor:
     """Memory of one level; empty at first.
 
     Levels are natural logarithms. `early` are the first values while the baseline is incomplete,
-    `bins` the distribution of all values. `latest` are the last values, each with the number of
+    `pending` those of a present alert, `bins` the distribution of all values. `latest` are the last values, each with the number of
     thresholds that it passed. `before` counts older values, and `exceeded` how many of them passed
     each threshold.
     """
@@ -68,6 +68,7 @@ class LevelMonitor:
     count: int = 0
     baseline: float = math.nan
     early: list[float] = field(default_factory=list)
+    pending: list[float] = field(default_factory=list)
     bins: Counter[int] = field(default_factory=Counter)
     latest: list[tuple[float, int]] = field(default_factory=list)
     before: int = 0
@@ -90,6 +91,11 @@ class LevelMonitor:
         if self.complete and self.finding.state != "alarm":
             self.finding = self._judged()
         return self.finding
+
+    def withhold(self) -> None:
+        """End the finding and forget the exceedances behind it: something else explains them."""
+        self.finding = NO_FINDING
+        self.latest = [(level, 0) for level, _ in self.latest]
 
     @property
     def complete(self) -> bool:
@@ -121,21 +127,29 @@ class LevelMonitor:
         return cls(
             count=cast("int", stored["count"]),
             baseline=cast("float", stored["baseline"]),
-            early=cast("list[float]", stored["early"]),
+            early=[*cast("list[float]", stored["early"])],
+            pending=[*cast("list[float]", stored["pending"])],
             bins=Counter({int(number): count for number, count in bins.items()}),
             latest=[(level, passed) for level, passed in latest],
             before=cast("int", stored["before"]),
-            exceeded=cast("list[int]", stored["exceeded"]),
+            exceeded=[*cast("list[int]", stored["exceeded"])],
             finding=LevelFinding(state, evidence),
         )
 
     def _add_to_baseline(self, level: float) -> None:
-        """Add a value to the distribution, and to the baseline until it is complete."""
+        """Add a value to the distribution, and to the baseline until it is complete.
+
+        Values of an alert count when it has ended by itself, those of an alarm never.
+        """
         self.count += 1
         self.bins[round(level / BIN)] += 1
         if self.count > BASELINE_SHARE * MAX_BASELINE:
-            self.early = []
+            self.early, self.pending = [], []
             return
+        if self.finding.state != "none":
+            self.pending.append(level)
+            return
+        self.early, self.pending = (self.early + self.pending)[:MAX_BASELINE], []
         if len(self.early) < MAX_BASELINE:
             self.early.append(level)
         self.baseline = median(self.early[: max(self.count // BASELINE_SHARE, FEWEST_VALUES)])
@@ -151,12 +165,14 @@ class LevelMonitor:
     def _height(self, limit: _Threshold) -> float:
         """Return a threshold over the reference; that of an alert also exceeds the scatter.
 
-        The scatter is that of the lower half of all values, which growth does not reach.
+        The scatter is that of the values below the reference, which growth does not reach.
         """
         height = math.log(limit.factor)
         if limit.state == "alarm":
             return height
-        scatter = self._quantile(0.5) - self._quantile(BELOW_ONE_DEVIATION)
+        reference = self.reference
+        below = sum(count for number, count in self.bins.items() if BIN * number <= reference)
+        scatter = reference - self._quantile(BELOW_ONE_DEVIATION * below / self.count)
         return min(max(height, ALERT_DEVIATIONS * scatter), math.log(ALARM_FACTOR))
 
     def _judged(self) -> LevelFinding:

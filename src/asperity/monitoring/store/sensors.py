@@ -405,6 +405,9 @@ class Sensors:
             blind = {"state": "blind", "since": file, "reason": reason, "raised_by": SILENCE}
             judgement["alarm"] |= {**blind, "verdict": f"Blind: {reason}."}
         judgement["verdict"] = f"Blind: {reason}. {judgement['verdict']}"
+        judgement["sensor"] = {"state": "blind", "reason": reason}
+        active = judgement["alarm"].get("causes", [])  # none in stores of older versions
+        judgement["alarm"]["causes"] = sorted({*active, SILENCE})
         query = "SELECT raised_by FROM judgement WHERE sensor = ? ORDER BY id DESC LIMIT 1"
         if self.store.read(query, self._first.number)[:1] == [(SILENCE,)]:
             return judgement
