@@ -248,10 +248,7 @@ def watch(
         watch_series(options, _states(tell))
         return
     options.results = results = out or folder / "asperity-watch"
-    read = recording.ReadOptions(rate_hz=rate, unit=unit, channel=channel, scale=scale)
-    settings = _track_settings(
-        read, workers, band, shaft, method, stages_from, false_alarms, acknowledge
-    )
+    settings = _watched_settings(options)
     options.tree = tree or monitoring.is_tree(folder, results)
     options.display = display = _watch_display(options)
     forecaster = series_forecaster(
@@ -266,6 +263,23 @@ def watch(
     )
     _show_updates(updates, display, mqtt=mqtt, quiet=quiet)
     end_with(display.state)
+
+
+def _watched_settings(options: SimpleNamespace) -> "TrackSettings":
+    """Build the settings of a series from the options of `watch`."""
+    read = recording.ReadOptions(
+        rate_hz=options.rate, unit=options.unit, channel=options.channel, scale=options.scale
+    )
+    return _track_settings(
+        read,
+        options.workers,
+        options.band,
+        options.shaft,
+        options.method,
+        options.stages_from,
+        options.false_alarms,
+        options.acknowledge,
+    )
 
 
 def _watch_display(options: SimpleNamespace) -> WatchDisplay:

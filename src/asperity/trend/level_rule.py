@@ -60,9 +60,9 @@ class LevelMonitor:
     """Memory of one level; empty at first.
 
     Levels are natural logarithms. `early` are the first values while the baseline is incomplete,
-    `pending` those of a present alert, `bins` the distribution of all values. `latest` are the last values, each with the number of
-    thresholds that it passed. `before` counts older values, and `exceeded` how many of them passed
-    each threshold.
+    `pending` those of a present alert, `bins` the distribution of all values. `latest` are the last
+    values, each with the number of thresholds that it passed. `before` counts older values, and
+    `exceeded` how many of them passed each threshold.
     """
 
     count: int = 0
