@@ -206,3 +206,16 @@ def test_states_do_not_depend_on_how_the_recordings_arrive(growth, tmp_path):
         assert found == expected, name
     assert summary(track_recordings([tmp_path / "at once"])) == expected
     assert expected[0] == ("none" if growth == "none" else "alarm")
+
+
+def test_an_old_acknowledgement_keeps_the_baseline_of_its_recordings(tmp_path):
+    """A watch that judges the first and latest recordings only, after a step in between."""
+    levels = np.exp(noise(31, 200, 0.05))
+    levels[60:] *= 2.6
+    write(tmp_path / "in", levels)
+    settings = WatchSettings(once=True, settle_time_s=0.0)
+    for acknowledge in (None, "s-0020.npz"):
+        chosen = TrackSettings(acknowledge=acknowledge)
+        *_, last = watch_folder(tmp_path / "in", tmp_path / "out", chosen, settings)
+        assert last.track.alarm.state == "alert"
+        assert last.track.alarm.level.factor == pytest.approx(2.6, rel=0.15)

@@ -168,16 +168,14 @@ def _previous_states(
 
 def _level_memory(tracked: Sequence[TrackedRecording], previous: PreviousStates) -> LevelMemory:
     """Return the memory of the levels, up to the recording after which it was stored."""
+
+    def number_after(file: str) -> int:
+        numbers = (n for n, recording in enumerate(tracked, 1) if file in recording.files)
+        return next(numbers, 0)
+
     if previous.levels is None:
-        return LevelMemory()
-    judged = next(
-        (
-            number
-            for number, recording in enumerate(tracked, 1)
-            if previous.levels.last in recording.files
-        ),
-        0,
-    )
+        return LevelMemory(gap=number_after(previous.before_gap))
+    judged = number_after(previous.levels.last)
     return LevelMemory(judged, previous.levels.monitors) if judged else LevelMemory()
 
 

@@ -43,12 +43,16 @@ class StoredLevels(NamedTuple):
 
 
 class PreviousStates(NamedTuple):
-    """States by file from previous judgements; reason and indicator of a standing alarm."""
+    """States by file from previous judgements; reason and indicator of a standing alarm.
+
+    Without `levels`, `before_gap` is the file after which recordings of a long series are missing.
+    """
 
     states: Mapping[str, AlarmState]
     reason: str = ""
     raised_by: str = ""
     levels: StoredLevels | None = None
+    before_gap: str = ""
 
 
 Key = tuple[str, str]  # of a recording: file and sensor

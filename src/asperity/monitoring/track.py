@@ -23,6 +23,7 @@ from asperity.monitoring.track_result import Track
 from asperity.recording import name_order_remark
 
 DEFAULTS = TrackSettings()
+MOST_NAMES = 4  # of folders in a note
 
 
 def track_recordings(
@@ -61,12 +62,25 @@ def track_recordings(
     x_name, places = _stated_places(files, x, parsed)
     readings = require_readable(_read_files(files, settings, target, places, progress))
     track = judge(readings, target, settings, places=places, x_name=x_name)
+    track = replace(track, notes=(*track.notes, *_several_folders(files)))
     if track.x_name == "recording" and (remark := name_order_remark(files)):
         track = replace(track, notes=(*track.notes, f"{remark[:1].upper()}{remark[1:]}."))
     if forecaster is None:
         return track
     rows = unacknowledged([recording.row() for recording in track.recordings], settings.acknowledge)
     return track.with_forecast(forecaster(rows, track.x_name, comparable=track.comparable))
+
+
+def _several_folders(files: Sequence[Path]) -> list[str]:
+    """Return a note on recordings of several folders, perhaps of several machines."""
+    folders = [*dict.fromkeys(file.parent.name for file in files)]
+    if len({file.parent for file in files}) < 2:
+        return []
+    names = ", ".join(folders[:MOST_NAMES]) + (", ..." if len(folders) > MOST_NAMES else "")
+    return [
+        f"Recordings of several folders ({names}) are judged as one series; if these are different "
+        "machines, track each folder by itself, or watch the tree."
+    ]
 
 
 def _read_files(

@@ -104,10 +104,14 @@ class RecordingStatus(NamedTuple):
 
 
 class LevelMemory(NamedTuple):
-    """Memory of all levels after `judged` recordings of the series, as JSON by level."""
+    """Memory of all levels after `judged` recordings of the series, as JSON by level.
+
+    After `gap` recordings others are missing: the baseline is that of the recordings before it.
+    """
 
     judged: int = 0
     monitors: Mapping[str, JsonObject] = MappingProxyType({})
+    gap: int = 0
 
 
 NO_MEMORY = LevelMemory()

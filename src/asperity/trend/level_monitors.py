@@ -37,7 +37,7 @@ class LevelMonitors:
         memory: LevelMemory = NO_MEMORY,
     ) -> None:
         self._levels = [series for series in monitored if not series.contact]
-        self._first, self._last = first, count - 1
+        self._first, self._last, self._gap = first, count - 1, memory.gap
         stored = memory.monitors if memory.judged >= first else {}
         self._next = max(memory.judged, first) if stored else first
         self._monitors = {
@@ -61,7 +61,9 @@ class LevelMonitors:
             monitors = {key: monitor.to_json() for key, monitor in self._monitors.items()}
             self.memory = LevelMemory(number, {**self.memory.monitors, **monitors})
         for series in self._levels:
-            self._monitors[series.identity].update(self._value(series, number))
+            monitor = self._monitors[series.identity]
+            monitor.update(self._value(series, number))
+            monitor.keeps_baseline |= number + 1 == self._gap
         self._next = number + 1
 
     def judgement(self) -> LevelJudgement:

@@ -59,14 +59,16 @@ NO_FINDING = LevelFinding("none")
 class LevelMonitor:
     """Memory of one level; empty at first.
 
-    Levels are natural logarithms. `early` are the first values while the baseline is incomplete,
-    `pending` those of a present alert, `bins` the distribution of all values. `latest` are the last
-    values, each with the number of thresholds that it passed. `before` counts older values, and
-    `exceeded` how many of them passed each threshold.
+    Levels are natural logarithms. With `keeps_baseline` the baseline is complete. `early` are the
+    first values while the baseline is incomplete, `pending` those of a present alert, `bins` the
+    distribution of all values. `latest` are the last values, each with the number of thresholds
+    that it passed. `before` counts older values, and `exceeded` how many of them passed each
+    threshold.
     """
 
     count: int = 0
     baseline: float = math.nan
+    keeps_baseline: bool = False
     early: list[float] = field(default_factory=list)
     pending: list[float] = field(default_factory=list)
     bins: Counter[int] = field(default_factory=Counter)
@@ -127,6 +129,7 @@ class LevelMonitor:
         return cls(
             count=cast("int", stored["count"]),
             baseline=cast("float", stored["baseline"]),
+            keeps_baseline=cast("bool", stored["keeps_baseline"]),
             early=[*cast("list[float]", stored["early"])],
             pending=[*cast("list[float]", stored["pending"])],
             bins=Counter({int(number): count for number, count in bins.items()}),
@@ -143,6 +146,8 @@ class LevelMonitor:
         """
         self.count += 1
         self.bins[round(level / BIN)] += 1
+        if self.keeps_baseline:
+            return
         if self.count > BASELINE_SHARE * MAX_BASELINE:
             self.early, self.pending = [], []
             return

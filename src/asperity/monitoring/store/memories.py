@@ -41,7 +41,7 @@ def read_levels(store: Store, sensor: int) -> StoredLevels | None:
 
 def write_levels(run: Run, sensor: int, track: Track) -> None:
     """Store the memory of the levels for the next judgement."""
-    judged, monitors = track.alarm.level_memory
+    judged, monitors, _ = track.alarm.level_memory
     run("DELETE FROM levels WHERE sensor = ?", (sensor,))
     if judged and monitors:
         stored = StoredLevels(track.recordings[judged - 1].file, monitors)

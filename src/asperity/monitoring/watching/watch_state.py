@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from hashlib import sha256
+from itertools import pairwise
 from pathlib import Path
 from time import monotonic, sleep, time
 from typing import Any
@@ -356,7 +357,8 @@ class WatchState:
         standing = self.sensors.standing
         reason, raised_by = ("", "") if standing is None else standing[1:]
         levels = None if afresh else self.sensors.levels()
-        previous = PreviousStates(states, reason, raised_by, levels)
+        before_gap = "" if levels is not None else _before_gap(order, window)
+        previous = PreviousStates(states, reason, raised_by, levels, before_gap)
         if self._memory is None:
             self._memory = self.sensors.series_memory()
         names = {file_name(key) for key in self._readings}
@@ -372,6 +374,15 @@ class WatchState:
         )
         forecast = self.schedule.standing(acknowledged)
         return track if forecast is None else track.with_forecast(forecast), window
+
+
+def _before_gap(order: Order, window: Sequence[FileVersion]) -> str:
+    """Return the last file before the recordings that a window leaves out; "" without any."""
+    numbers = {key: number for number, key in enumerate(order.keys)}
+    for before, after in pairwise(window):
+        if numbers[after] > numbers[before] + 1:
+            return before.file
+    return ""
 
 
 def _acknowledged_name(acknowledge: str, keys: Sequence[FileVersion]) -> str:
