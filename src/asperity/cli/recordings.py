@@ -244,7 +244,7 @@ def watch(
 ) -> None:
     """Track recordings as they arrive in a folder, until Ctrl-C; a later watch continues it."""
     options = SimpleNamespace(**locals())
-    if folder.is_file():
+    if folder.is_file() and folder.suffix.lower() in monitoring.SERIES_SUFFIXES:
         watch_series(options, _states(tell))
         return
     options.results = results = out or folder / "asperity-watch"

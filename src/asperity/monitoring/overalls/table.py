@@ -18,7 +18,7 @@ from asperity.core.third_party import first_line
 from asperity.recording import OPERATING_KEYS, is_time_column, name_and_unit, read_sidecar
 
 Column: TypeAlias = "pandas.Series[Any]"
-SUFFIXES = (".csv", ".txt", ".parquet", ".jsonl", ".ndjson")
+SERIES_SUFFIXES = (".csv", ".txt", ".parquet", ".jsonl", ".ndjson")
 MOST_BYTES = 500_000_000
 SAMPLE_LINES = 50  # that decide the decimal sign
 SEPARATORS = (";", "\t", ",")
@@ -120,9 +120,9 @@ def _columns(
 def _read(path: Path) -> pandas.DataFrame:
     require_file(path)
     suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
+    if suffix not in SERIES_SUFFIXES:
         raise BadInput(
-            f"a series is read from {', '.join(SUFFIXES)}, got {path.name}; convert it to .csv"
+            f"a series is read from {', '.join(SERIES_SUFFIXES)}, got {path.name}; convert it to .csv"
         )
     if path.stat().st_size > MOST_BYTES:
         raise BadInput(f"{path.name} is above {MOST_BYTES / 1e6:.0f} MB; split it, or average rows")
