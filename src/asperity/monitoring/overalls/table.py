@@ -122,7 +122,8 @@ def _read(path: Path) -> pandas.DataFrame:
     suffix = path.suffix.lower()
     if suffix not in SERIES_SUFFIXES:
         raise BadInput(
-            f"a series is read from {', '.join(SERIES_SUFFIXES)}, got {path.name}; convert it to .csv"
+            f"a series is read from {', '.join(SERIES_SUFFIXES)}, got {path.name}; "
+            "convert it to .csv"
         )
     if path.stat().st_size > MOST_BYTES:
         raise BadInput(f"{path.name} is above {MOST_BYTES / 1e6:.0f} MB; split it, or average rows")
