@@ -131,7 +131,7 @@ def test_a_tachometer_of_another_length_is_not_used(asp):
     [
         (
             {"faults_per_turn": {"BPFO": 0}},
-            "faults_per_turn must be positive rates by name, such as { BPFO = 3.58 }",
+            "faults_per_turn must be positive fault frequencies by name, such as { BPFO = 3.58 }",
         ),
         ({"bands_hz": {"low": [100]}}, "bands_hz must be two frequencies by name"),
         ({"condition_channels": {"load": "F"}}, "condition_channels must name channels by load_n"),

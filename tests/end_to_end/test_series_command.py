@@ -47,7 +47,7 @@ def test_table_and_file(asp):
         (["track", "x.csv", "--series", "trend.csv"], "got recordings too; leave one out"),
         (["track", "--series", "trend.csv", "--report", "r.html"], "got --report too"),
         (["track", "--series", "absent.csv"], "absent.csv"),
-        (["track", "--series", "trend.csv", "--acknowledge", "noon"], "is no time stamp"),
+        (["track", "--series", "trend.csv", "--acknowledge", "noon"], "is not a time stamp"),
         (["track", "--series", "trend.csv", "--out", "judged.nc"], "saved as .csv"),
     ],
 )

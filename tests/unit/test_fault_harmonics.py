@@ -1,4 +1,4 @@
-"""Harmonics that two fault rates share: a fault must not show at the other rate."""
+"""Harmonics shared by two fault frequencies: a fault must not show at the other one."""
 
 import numpy as np
 import pytest

@@ -9,7 +9,7 @@ import pytest
 from asperity.case import load_case
 from asperity.core.errors import BadInput, UnreadableFile
 from asperity.core.files import write_csv
-from asperity.core.limits import memory_limit, require_affordable, require_unpacked
+from asperity.core.limits import memory_limit, require_affordable, require_plausible_size
 from asperity.coupling import VibrationModel
 from asperity.paper import RigSettings, papers_case, simulate_rig
 from asperity.recording import read_recording
@@ -50,14 +50,14 @@ def test_the_default_limit_is_the_memory_of_the_machine(monkeypatch):
 def test_a_file_may_unpack_by_the_usual_factor_of_measured_data(tmp_path, monkeypatch):
     path = tmp_path / "x.h5"
     path.write_bytes(bytes(range(256)) * 40000)  # 10 MB
-    require_unpacked(path, 5e8, "export it again")
+    require_plausible_size(path, 5e8, "export it again")
     with pytest.raises(
         UnreadableFile,
         match=r"x\.h5 of 0\.01 GB declares 0\.6 GB of content, more than the limit of 0\.51",
     ):
-        require_unpacked(path, 6e8, "export it again")
+        require_plausible_size(path, 6e8, "export it again")
     monkeypatch.setenv("ASPERITY_MEMORY_GB", "1")
-    require_unpacked(path, 6e8, "export it again")
+    require_plausible_size(path, 6e8, "export it again")
 
 
 OVERSIZED = {

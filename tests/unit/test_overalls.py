@@ -142,7 +142,9 @@ def test_acknowledged_rows_start_a_new_baseline(tmp_path):
     assert track_overalls(path, acknowledge="last").state == "none"
     judged = track_overalls(path, acknowledge="2025-01-13 18:00:00")
     assert judged.state == "none"
-    with pytest.raises(BadInput, match="acknowledge one, such as 2025-01-15T15:00:00, or last"):
+    with pytest.raises(
+        BadInput, match="acknowledge one of them, such as 2025-01-15T15:00:00, or 'last'"
+    ):
         track_overalls(path, acknowledge="2025-01-13 18:30")
 
 

@@ -97,7 +97,7 @@ def test_one_of_two_consistent_sensors_suffices_for_a_recording():
         {"a": sensors["a"], "b": [*sensors["b"][:9], None, None, None]}, band_hz=BAND
     )
     assert judgement.detected_on == (("a", "b"),) * 9 + (("a",),) * 3
-    assert judgement.resonances[10].reason.endswith("here on a only")
+    assert judgement.resonances[10].reason.endswith("detected by sensor a only")
     white = [replace(spectrum, density=np.ones_like(spectrum.density)) for spectrum in sensors["b"]]
     undetected = resonances_of_sensors({"a": sensors["a"], "b": white}, band_hz=BAND)
     assert not any(resonance.found for resonance in undetected.resonances)

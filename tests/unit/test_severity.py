@@ -209,9 +209,9 @@ def test_an_envelope_fault_alarms_at_constant_level(tmp_path, late):
     ("sidecar", "message"),
     [
         ({"machine_class": "huge"}, "machine_class must be one of large-rigid"),
-        ({"faults_hz": 87.3}, "faults_hz must be positive rates by name"),
-        ({"faults_hz": {"BPFO": -1.0}}, "faults_hz must be positive rates by name"),
-        ({"faults_hz": {}}, "faults_hz must be positive rates by name"),
+        ({"faults_hz": 87.3}, "faults_hz must be positive fault frequencies by name"),
+        ({"faults_hz": {"BPFO": -1.0}}, "faults_hz must be positive fault frequencies by name"),
+        ({"faults_hz": {}}, "faults_hz must be positive fault frequencies by name"),
     ],
 )
 def test_an_invalid_sidecar_is_refused(tmp_path, sidecar, message):

@@ -167,8 +167,8 @@ def test_files_without_a_run_are_refused(tmp_path):
     reasons = {
         "text": "has no digest",
         "foreign": "has no digest",
-        "letter": "no netCDF file",
-        "other": "not a run of asperity",
+        "letter": "not a netCDF file",
+        "other": "not a saved asperity run",
         "newer": "run format 99",
         "empty": "damaged",
         "absent": "does not exist",

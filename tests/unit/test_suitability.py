@@ -58,7 +58,11 @@ def test_a_recording_is_good_for_what_reading_it_provides(tmp_path, name):
 @pytest.mark.parametrize(
     ("given", "use", "reason"),
     [
-        ({}, "envelope", "resolves 1 to 3000 Hz; state rates as faults_hz or faults_per_turn"),
+        (
+            {},
+            "envelope",
+            "resolves 1 to 3000 Hz; state fault frequencies as faults_hz or faults_per_turn",
+        ),
         ({"faults_hz": RATES}, "envelope", "resolves 1 to 3000 Hz: FTF, BPFO"),
         ({"faults_hz": RATES, "seconds": 0.4}, "envelope", "10 to 3000 Hz: BPFO, not FTF (9 Hz)"),
         ({"faults_hz": {"mesh": 5e3}}, "envelope", "resolves 1 to 3000 Hz, not mesh (5000 Hz)"),
@@ -99,8 +103,8 @@ def test_the_command_shows_what_a_recording_is_good_for(tmp_path, capsys):
         "level": True,
     }
     text = shown(capsys, str(short))
-    assert "good for: envelope at fault rates, level trend." in text.splitlines()[0]
-    assert "no contact resonance; envelope at fault rates, level trend" in text
+    assert "good for: envelope at fault frequencies, level trend." in text.splitlines()[0]
+    assert "no contact resonance; envelope at fault frequencies, level trend" in text
     assert "NO: too short: 0.15 s; velocities from 10 Hz need 3.2 s" in text
 
 
@@ -110,5 +114,5 @@ def test_the_verdict_on_several_states_for_what_the_others_are_good(tmp_path):
     write(tmp_path / "c.npz", scale=1e-4)
     assert check_recordings([tmp_path], band_hz=BAND).verdict() == (
         "1 of 3 recordings can be used: too short; the machine was off, or the sensor "
-        "disconnected. Other uses: envelope at fault rates (1), level trend (1)."
+        "disconnected. Other uses: envelope at fault frequencies (1), level trend (1)."
     )

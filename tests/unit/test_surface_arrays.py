@@ -89,7 +89,7 @@ def test_units_of_coordinates_and_heights_are_those_of_the_array():
         (labelled(x_unit="um", y_unit="mm"), "x in um and y in mm; give both one unit"),
         (labelled(height_unit="%"), "values in %, not heights; export its height"),
         (labelled().assign_coords(x=np.arange(32.0) ** 2), "x that is not evenly spaced"),
-        (np.zeros((8, 8, 3)), "3 axes"),
+        (np.zeros((8, 8, 3)), "3-dimensional array"),
         (np.full((8, 8), "a"), "type <U1"),
     ],
 )

@@ -1,4 +1,4 @@
-"""Laws of removal, wear steps and tracks against closed forms and conservation."""
+"""Wear laws, wear steps and tracks against closed forms and conservation."""
 
 import math
 

@@ -5,6 +5,8 @@ calibrated to the same coverage: calibrate them again when it changes.
 """
 
 COVERAGE = 0.90  # share of the intervals that contain the true value
-UPPER = 0.95  # quantile at the upper end of an interval: (1 + COVERAGE)/2
-QUANTILES = (0.05, 0.5, UPPER)  # lower end, median, upper end
-NORMAL_FACTOR = 1.6448536269514722  # half-width of a normal interval [standard deviations]
+UPPER = (1.0 + COVERAGE) / 2.0  # quantile at the upper end of an interval
+QUANTILES = (round(1.0 - UPPER, 12), 0.5, UPPER)  # lower end, median, upper end
+# half-width of a normal interval [standard deviations]: scipy.special.ndtri(UPPER), stated because
+# NormalDist().inv_cdf(UPPER) differs in the last digits and scipy is slow to import
+NORMAL_FACTOR = 1.6448536269514722

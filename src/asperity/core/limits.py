@@ -102,7 +102,7 @@ def stored_size(path: Path) -> int:
     return min(status.st_size, 512 * getattr(status, "st_blocks", status.st_size) or status.st_size)
 
 
-def require_unpacked(path: Path, declared: float, remedy: str) -> None:
+def require_plausible_size(path: Path, declared: float, remedy: str) -> None:
     """Raise UnreadableFile if a file declares far more content than it stores (a zip bomb)."""
     stored = stored_size(path)
     limit = unpacked_limit(stored)

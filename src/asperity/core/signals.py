@@ -12,6 +12,7 @@ import scipy
 from asperity.core.arrays import Field, Mask
 from asperity.core.errors import BadInput, require_positive
 
+OVERLAP = 0.5  # of successive segments, over their length; a boxcar has none
 FFT_BATCH_SAMPLES = 1 << 18  # transformed together, so that they fit the processor's cache
 FILTER_BLOCK_SAMPLES = 1 << 15  # filtered together
 
@@ -161,7 +162,7 @@ def averaged_spectrum(
             f"spectrum window {window!r} is unknown ({error}); try hann or boxcar"
         ) from None
 
-    step = segment if window == "boxcar" else segment - segment // 2
+    step = segment if window == "boxcar" else segment - int(OVERLAP * segment)
     total, complete, samples = _summed_periodograms(blocks, weights, step)
     if not complete.any():
         gaps = " without a gap" if complete.size else ""

@@ -120,7 +120,7 @@ def read_netcdf(path: Path, remedy: str) -> "xarray.Dataset":
         with xarray.open_dataset(body, engine="h5netcdf", decode_cf=False) as opened:
             return opened.load()
     except Exception as error:
-        raise UnreadableFile(f"{path} is no netCDF file; {remedy}") from error
+        raise UnreadableFile(f"{path} is not a netCDF file; {remedy}") from error
 
 
 # Tables

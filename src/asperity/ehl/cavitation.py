@@ -134,7 +134,7 @@ def solve_film(
         density=density or Incompressible(1.0),
         boundary=boundary,
     )
-    _check(channel, line=line, field_spacing=not isinstance(spacing, (int, float)))
+    _check_channel(channel, is_line=line, two_cell_sizes=not isinstance(spacing, (int, float)))
     signed, flows, residual, steps = _solve_newton(channel, tolerance)
     pressure, content = channel.split(signed)
     index = np.s_[:, 0] if line else np.s_[:]
@@ -410,17 +410,17 @@ def _newton_step(flows: Flows) -> Field:
     return np.asarray(change).reshape(flows.outflow.shape)
 
 
-def _check(channel: RoughChannel, *, line: bool, field_spacing: bool) -> None:
+def _check_channel(channel: RoughChannel, *, is_line: bool, two_cell_sizes: bool) -> None:
     """Raise BadInput for an impossible channel."""
     gap = channel.gap
     if gap.ndim != 2 or len(gap) < 2:
         raise BadInput(
             f"gap must have shape (nx,) or (nx, ny) with two cells or more along x, got {gap.shape}"
         )
-    if line == field_spacing:
-        expected = "one cell size" if line else "(dx, dy)"
+    if is_line == two_cell_sizes:
+        expected = "one cell size" if is_line else "(dx, dy)"
         raise BadInput(
-            f"spacing must be {expected} for a gap of shape {gap.shape[: 1 if line else 2]}"
+            f"spacing must be {expected} for a gap of shape {gap.shape[: 1 if is_line else 2]}"
         )
     if not np.all((gap > 0.0) & (gap < np.inf)):
         raise BadInput(
@@ -434,15 +434,16 @@ def _check(channel: RoughChannel, *, line: bool, field_spacing: bool) -> None:
     ):
         if not all(0.0 <= value < np.inf for value in pressure):
             raise BadInput(
-                f"{name} must be finite and not below the cavitation pressure 0, got {pressure} Pa"
+                f"pressures at the {name} must be finite and at least the cavitation pressure, "
+                f"0 Pa, got {pressure} Pa"
             )
     if not 0.0 < channel.boundary.inflow_content <= 1.0:
         raise BadInput(
-            f"inflow content must lie between 0 and 1, got {channel.boundary.inflow_content:g}; 1 "
+            f"inflow_content must lie between 0 and 1, got {channel.boundary.inflow_content:g}; 1 "
             "is a full gap"
         )
     if channel.boundary.inflow_content < 1.0 and channel.boundary.ends[0] > 0.0:
         raise BadInput(
-            f"oil that enters at {channel.boundary.ends[0]:g} Pa fills the gap, got inflow content "
-            f"{channel.boundary.inflow_content:g}; use 1"
+            "inflow_content must be 1 where the inlet pressure is above the cavitation pressure "
+            f"({channel.boundary.ends[0]:g} Pa), got {channel.boundary.inflow_content:g}"
         )

@@ -310,9 +310,8 @@ def _check_grid(
         loaded = max(half, light[index])
         if spacing > 0.25 * loaded:
             raise BadInput(
-                f"cells of {spacing * 1e6:.3g} um along {axis} leave fewer than 8 across the "
-                "contact of "
-                f"{2.0 * loaded * 1e6:.3g} um; use more cells"
+                f"cells of {spacing * 1e6:.3g} um along {axis} are too coarse: fewer than 8 span "
+                f"the {2.0 * loaded * 1e6:.3g} um contact; use more cells"
             )
     _check_cap(conditions, grid)
 
@@ -372,7 +371,6 @@ def _check_ends(conditions: ContactConditions, grid: Grid) -> None:
         )
     if grid.spacing[1] > (high - low) / 16.0:
         raise BadInput(
-            f"cells of {grid.spacing[1] * 1e6:.3g} um along y leave fewer than 16 on the loaded "
-            "length of "
-            f"{(high - low) * 1e3:.3g} mm; use more cells"
+            f"cells of {grid.spacing[1] * 1e6:.3g} um along y are too coarse: fewer than 16 span "
+            f"the {(high - low) * 1e3:.3g} mm loaded length; use more cells"
         )

@@ -85,12 +85,12 @@ class CylindricalRollerBearing:
     def __post_init__(self) -> None:
         require_positive("roller_length", self.roller_length, "m")
         require_choice("profile", self.profile, get_args(RollerProfile))
-        _ = self.kinematics
+        _ = self.kinematics  # checks the number of rollers, diameters and speed
         require_load(self.radial_load, self.clearance, self.roller_diameter, "roller")
         if self.slices < SLICES:
             raise BadInput(
                 f"slices must be at least {SLICES}, as required by ISO 16281, got {self.slices}; "
-                "raise it"
+                "use more slices"
             )
 
     @cached_property

@@ -430,5 +430,6 @@ def _acknowledged(tracked: Sequence[TrackedRecording], name: str | None) -> int:
         if any(name in (file, Path(file).name) for file in recording.files):
             return number
     raise BadInput(
-        f"{name} is not among the {len(tracked)} recordings; acknowledge one of them, or {LAST}"
+        f"{name} is not among the {len(tracked)} recordings; acknowledge one of "
+        f"them, or {LAST!r} for the newest"
     )

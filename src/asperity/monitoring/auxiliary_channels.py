@@ -1,4 +1,4 @@
-"""Auxiliary channels of a recording: load, speed, temperature and tacho; rates of the machine.
+"""Auxiliary channels of a recording: load, speed, temperature and tacho; fault frequencies.
 
 `asperity.recording` defines which channels a sidecar may name.
 """
@@ -30,8 +30,8 @@ from asperity.vibration import (
 )
 
 MAX_SAMPLES = 1 << 21  # for order tracking, which holds them in memory
-MIN_WIDTH = 1.5  # spectral lines on either side of a rate: the main lobe of a Hann window
-MIN_LINES = 4  # spectral lines below a rate for its line to be resolved
+MIN_WIDTH = 1.5  # spectral lines on either side of a frequency: the main lobe of a Hann window
+MIN_LINES = 4  # spectral lines below a frequency for its line to be resolved
 UNITS: dict[str, dict[str, float]] = {  # factors from the unit of a channel to that of a key
     "load_n": {"N": 1.0, "kN": 1e3, "mN": 1e-3, "MN": 1e6},
     "entrainment_m_s": {"m/s": 1.0, "mm/s": 1e-3},
@@ -51,7 +51,7 @@ DEFAULT_BANDS = {
     "above 5 kHz": (5000.0, np.inf),
 }
 SPEED_TOLERANCE = 0.1  # relative difference of stated speed and tacho, above which it is remarked
-CLOCK_TOLERANCE = 1e-6  # relative difference of equal rates
+CLOCK_TOLERANCE = 1e-6  # relative difference of equal sampling rates
 USABLE_BANDWIDTH = 0.4  # of the sampling rate; the anti-alias filter cuts above it
 
 
@@ -143,7 +143,7 @@ def _contradiction(opened: OpenRecording, turning: Turning) -> tuple[str, ...]:
 def fault_rates(
     opened: OpenRecording, auxiliary: AuxiliaryData, target: Target
 ) -> dict[str, float]:
-    """Return the rates [Hz] of faults and meshes at the speed of a recording, by name."""
+    """Return the frequencies [Hz] of faults and meshes at the speed of a recording, by name."""
     fact = opened.facts.get("speed_hz")
     speed = (
         float(auxiliary.facts["speed_hz"][0])
@@ -163,7 +163,7 @@ def fault_rates(
 
 
 def order_tracked(opened: OpenRecording, auxiliary: AuxiliaryData) -> tuple[Field, float] | None:
-    """Return the vibration resampled to constant speed, and its rate; None without an angle."""
+    """Return the vibration at constant speed and its sampling rate; None without an angle."""
     if auxiliary.turning is None:
         return None
     blocks, count = [], 0
@@ -183,7 +183,7 @@ def order_tracked(opened: OpenRecording, auxiliary: AuxiliaryData) -> tuple[Fiel
 def envelope_and_lines(
     rates_hz: Mapping[str, float], values: Field, rate_hz: float, unit: str, segment: int
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Return envelope depths and rms of the lines at rates, of a vibration in memory."""
+    """Return envelope depths and line rms at fault frequencies, of a vibration in memory."""
     envelope = Envelope(rate_hz)
     for _ in envelope.watch([values]):
         pass
@@ -192,9 +192,9 @@ def envelope_and_lines(
 
 
 def lines(frequency_hz: Field, density: Field, rates_hz: Mapping[str, float]) -> dict[str, float]:
-    """Return the rms at each rate and its next two harmonics; nan if they are not resolved.
+    """Return the rms at each frequency and its next two harmonics; nan if they are not resolved.
 
-    A harmonic that several rates share counts for the one whose own lines are present.
+    A harmonic shared by several fault frequencies counts for the one whose own lines are present.
     """
     spacing = float(frequency_hz[1])
     resolution = MIN_WIDTH * spacing
@@ -247,7 +247,7 @@ def _factor(unit: str, key: str, path: Path, name: str) -> float:
 
 
 def _require_same_clock(opened: OpenRecording, name: str) -> None:
-    """Raise BadInput unless tacho and vibration have the same rate and number of samples."""
+    """Raise BadInput unless tacho and vibration have equal sampling rate and length."""
     tacho = raw_channel(opened.path, name)
     for quantity, value, expected in (
         ("Hz", tacho.rate_hz, opened.channel.rate_hz),

@@ -56,12 +56,12 @@ MIN_POOL_BYTES = 32 << 20  # total size from which parallel reading is worth a s
 class Reading:
     """Result of reading one file; without a `spectrum`, `reason` states why.
 
-    `sensor` is its name, empty if not stated. `bands` are rms in bands, `lines` rms at the rates of
-    faults and meshes with two harmonics. `rate_doubt` is the relative standard deviation of the
-    sampling rate. `facts` are texts by name with their sources; `started` is in ISO format or
-    empty. `depths` are the modulation depths of the envelope at the rates of faults; `velocity` is
-    rms from 10 to 1000 Hz [m/s], nan for other values than accelerations and velocities, and for
-    short ones.
+    `sensor` is its name, empty if not stated. `bands` are rms in bands, `lines` rms at the
+    frequencies of faults and meshes with two harmonics. `rate_doubt` is the relative standard
+    deviation of the sampling rate. `facts` are texts by name with their sources; `started` is in
+    ISO format or empty. `depths` are the modulation depths of the envelope at fault frequencies;
+    `velocity` is rms from 10 to 1000 Hz [m/s], nan for short recordings and for values other than
+    accelerations and velocities.
     """
 
     file: str

@@ -1,4 +1,4 @@
-"""Uses of a recording: contact resonance, envelope at fault rates, velocity zone, level trend.
+"""Uses of a recording: contact resonance, envelope, velocity zone and level trend.
 
 Each is judged by the requirements of its own method; `reading` computes the numbers.
 """
@@ -18,7 +18,7 @@ from asperity.vibration import Envelope
 
 USES = {  # key: label
     "contact_resonance": "contact resonance",
-    "envelope": "envelope at fault rates",
+    "envelope": "envelope at fault frequencies",
     "zone": "velocity zone",
     "level": "level trend",
 }
@@ -40,7 +40,7 @@ def suitabilities(
 ) -> dict[str, Suitability]:
     """Return for each of `USES` whether a recording is good for it, by its sample statistics.
 
-    `rates_hz` are the rates of faults, where they are known.
+    `rates_hz` are the fault frequencies, where they are known.
     """
     quality = statistics.quality(opened, width_hz=target.width_hz, band_hz=target.band_hz)
     low, high = target.band_hz
@@ -68,16 +68,20 @@ def _level(opened: OpenRecording) -> str:
 def _envelope(
     opened: OpenRecording, quality: Quality, rates_hz: Mapping[str, float]
 ) -> Suitability:
-    """Judge by the rates that the envelope resolves, and those that are stated."""
+    """Judge by the frequencies that the envelope resolves, and the stated fault frequencies."""
     envelope = Envelope(opened.rate_hz)
     lowest, highest = envelope.range_hz(quality.samples)
     if not lowest < highest:
-        return Suitability(False, f"too short: {quality.duration_s:.3g} s resolve no rate")
+        return Suitability(
+            False, f"too short: {quality.duration_s:.3g} s resolve no fault frequency"
+        )
     if (quality.gaps or quality.stuck) and not _has_whole_chunk(opened, envelope):
         return Suitability(False, "no stretch without lost samples is as long as a transform")
     resolved = f"resolves {lowest:.3g} to {highest:.4g} Hz"
     if not rates_hz:
-        return Suitability(True, f"{resolved}; state rates as faults_hz or faults_per_turn")
+        return Suitability(
+            True, f"{resolved}; state fault frequencies as faults_hz or faults_per_turn"
+        )
     within = [name for name, rate in rates_hz.items() if lowest <= rate <= highest]
     beyond = [f"{name} ({rates_hz[name]:.4g} Hz)" for name in rates_hz if name not in within]
     if not within:

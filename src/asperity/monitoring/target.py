@@ -19,7 +19,7 @@ class Target:
     `band_hz` are its ends; `width_hz` is the half-power width of a line at the lower end;
     `full_load_crf_hz` the resonance with all load on asperities, None without a contact model.
     `source` states the origin of the band; `assumed` is true if the user gave neither case nor
-    band; `case` is the contact. `rates_per_turn` are rates of a machine per turn of its shaft, by
+    band; `case` is the contact. `rates_per_turn` are the fault frequencies as shaft orders, by
     name, and `shaft_hz` is the shaft's speed in the case.
     """
 
@@ -107,7 +107,7 @@ def _contact(machine: MachineCase) -> Case | None:
 
 
 def _rates(machine: MachineCase) -> tuple[dict[str, float], float | None]:
-    """Return rates per turn of the shaft, by name, and the shaft's speed [Hz]."""
+    """Return fault frequencies as shaft orders, by name, and the shaft's speed [Hz]."""
     rates = machine.machine.frequencies
     shaft = next((rates[name] for name in SHAFTS if rates.get(name, 0.0) > 0.0), None)
     if shaft is None:
@@ -116,6 +116,6 @@ def _rates(machine: MachineCase) -> tuple[dict[str, float], float | None]:
 
 
 def _name(key: str) -> str:
-    """Return the label of a rate, such as BPFO."""
+    """Return the label of a fault frequency, such as BPFO."""
     name = key.removesuffix("_hz")
     return name.upper() if name in ("bpfo", "bpfi", "bsf", "ftf") else name.replace("_", " ")

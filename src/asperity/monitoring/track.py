@@ -43,7 +43,7 @@ def track_recordings(
     paths : files, and folders of files
     settings : how recordings are read and judged
     case : its contact model gives the search band and the load share that belongs to a CRF; that
-        of a machine also gives the mesh and defect rates. Without case and band the paper's
+        of a machine also gives the mesh and fault frequencies. Without case and band the paper's
         contact is assumed, and `notes` say so
     x : place of each recording in the series, shape (recordings,); alternatively `table`, a csv
         file for `read_table` or its result. Default: hours since the first recording if all

@@ -180,7 +180,7 @@ class SampleStatistics:
 
     @property
     def piled(self) -> bool:
-        """True where values pile up below an extreme: soft clipping, or a pure tone."""
+        """True if amplitudes accumulate near an extreme: soft clipping, or a pure tone."""
         return any(_is_piled(side) for side in self._heights)
 
     def without_stuck(self, blocks: Iterable[Field]) -> Iterator[Field]:
@@ -250,7 +250,7 @@ class SampleStatistics:
         """Yield the reasons why the recording cannot be used."""
         duration = self.samples / recording.rate_hz
         if self.finite < 2:
-            yield f"it holds {self.finite} values"
+            yield f"it contains {self.finite} values"
         elif off:
             unit = _unit_in_words(recording)
             yield f"the machine was off, or the sensor disconnected: rms {self._rms:.2g} {unit}"
@@ -291,13 +291,13 @@ class SampleStatistics:
             yield f"clipped at its extremes: {100 * self._clipped:.2g} % of the samples, {effect}"
         elif self.piled:
             yield (
-                "values pile up below the largest: soft clipping, which makes CRFA too low, or a "
-                "pure tone"
+                "amplitudes accumulate near the extremes: soft clipping, which makes CRFA too low, "
+                "or a pure tone"
             )
         if 0 < self.stuck <= LARGEST_STUCK_SHARE * self.finite:
             yield (
                 f"constant for {100 * self.stuck / self.finite:.2g} % of the time: lost samples? "
-                "Left out of the spectrum"
+                "Excluded from the spectrum"
             )
         if self._rms > 0.0 and abs(self.mean) > OFFSET_RATIO * self._rms:
             ratio = abs(self.mean) / self._rms

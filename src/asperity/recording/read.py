@@ -13,7 +13,7 @@ from zipfile import BadZipFile, ZipFile
 
 from asperity.core.errors import BadInput, UnreadableFile, require_positive
 from asperity.core.files import require_file
-from asperity.core.limits import require_unpacked
+from asperity.core.limits import require_plausible_size
 from asperity.core.third_party import first_line, suppress_output
 from asperity.recording import (
     hdf5,
@@ -171,7 +171,9 @@ def read_contents(path: Path) -> Contents:
             f"{path.name} holds {len(contents.channels)} channels, more than {MOST_CHANNELS}; "
             f"{REMEDY}"
         )
-    require_unpacked(path, 8.0 * sum(channel.samples or 0 for channel in contents.channels), REMEDY)
+    require_plausible_size(
+        path, 8.0 * sum(channel.samples or 0 for channel in contents.channels), REMEDY
+    )
     if not contents.recorded:
         raise UnreadableFile(
             f"{path.name} holds no row of samples; give a file with a recording in it"

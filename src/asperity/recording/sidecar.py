@@ -143,7 +143,9 @@ def _table_requirement(key: str, value: object) -> tuple[bool, str]:
     if key in FAULT_RATE_KEYS:
         rates = [_number(rate) or 0.0 for rate in entries.values()]
         valid = entries and all(0.0 < rate < math.inf for rate in rates)
-        return bool(valid), f"be positive rates by name, such as {{ BPFO = {EXAMPLE_RATES[key]} }}"
+        return bool(
+            valid
+        ), f"be positive fault frequencies by name, such as {{ BPFO = {EXAMPLE_RATES[key]} }}"
     if key == "bands_hz":
         valid = entries and all(map(_is_band, entries.values()))
         return bool(valid), ("be two frequencies by name, such as { housing = [2000, 5000] }")

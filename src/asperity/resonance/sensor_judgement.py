@@ -344,7 +344,7 @@ class JointJudgement:
             crf_shared_std=fit.crf_shared_std * widening,
             crfa=height[0],
             crfa_std=height[1],
-            reason=f"{fit.reason}, here on {name} only" if several else fit.reason,
+            reason=f"{fit.reason}, detected by sensor {name} only" if several else fit.reason,
         ), (name,)
 
     def _deviations(

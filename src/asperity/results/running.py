@@ -232,11 +232,11 @@ def run_tracks(
         own = further[0]() if coarse_cells else Determined(fine)
         others = [outcome() for number, outcome in further.items() if number > 0]
     if own.value is None:  # without the coarse grid, the other tracks cannot be corrected
-        everything = [fine]
+        track_series = [fine]
     else:
-        everything = [own.value, *(other.value for other in others if other.value is not None)]
-    running = _running(case, everything, fine)
-    return running, _moment(fine), _notes(running, everything, [own, *others])
+        track_series = [own.value, *(other.value for other in others if other.value is not None)]
+    running = _running(case, track_series, fine)
+    return running, _moment(fine), _notes(running, track_series, [own, *others])
 
 
 def _moment(fine: Series) -> ContactSolution:
@@ -246,7 +246,7 @@ def _moment(fine: Series) -> ContactSolution:
     return next((solution for solution in order if solution.convergence.converged), kept[-1])
 
 
-def _notes(running: Running, coarse: list[Series], outcomes: list[Determined[Series]]) -> list[str]:
+def _notes(running: Running, tracks: list[Series], outcomes: list[Determined[Series]]) -> list[str]:
     """Return notes on tracks that failed or are not stationary, and on failed time steps."""
     notes = [_FROM_START if running.snapshot_clr is not None else _FROM_END]
     notes += [
@@ -257,7 +257,7 @@ def _notes(running: Running, coarse: list[Series], outcomes: list[Determined[Ser
     if outcomes[0].value is None:
         reason = outcomes[0].reason.rstrip(".")
         notes.append(f"The error due to the cells is not determined on a coarser grid: {reason}.")
-    for number, series in enumerate(coarse, 1):
+    for number, series in enumerate(tracks, 1):
         if settled_from(series, "clr") is None:
             notes.append(
                 f"The load share of track {number} is not stationary after {series.length} "
@@ -271,24 +271,24 @@ def _notes(running: Running, coarse: list[Series], outcomes: list[Determined[Ser
     return notes
 
 
-def _running(case: Case, coarse: list[Series], fine: Series) -> Running:
-    """Return the running contact of all series."""
-    cuts = [_cut(series) for series in coarse]
-    everything = coarse if fine is coarse[0] else [*coarse, fine]
-    means, start = time_means(coarse, cuts, fine), fine.kept[0]
+def _running(case: Case, track_series: list[Series], fine: Series) -> Running:
+    """Combine the series of all tracks and grids into one result."""
+    cuts = [_cut(series) for series in track_series]
+    all_series = track_series if fine is track_series[0] else [*track_series, fine]
+    means, start = time_means(track_series, cuts, fine), fine.kept[0]
     totals: dict[str, Scalar] = {
-        "iterations": sum(series.iterations for series in everything),
-        "seconds": sum(series.seconds for series in everything),
+        "iterations": sum(series.iterations for series in all_series),
+        "seconds": sum(series.seconds for series in all_series),
         "friction_error": _error(means["friction_coefficient"]),
     }
     return Running(
         numbers=_numbers(case, means, _moments(fine, cuts[0])) | totals,
         clr=replace(means["clr"], time=min(means["clr"].time, 1.0)),  # the range of a share
         snapshot_clr=start.state.clr if start.solution.convergence.converged else None,
-        tracks=len(coarse),
+        tracks=len(track_series),
         cells=fine.cells,
-        steps=sum(len(series.values) - 1 for series in everything),
-        failed=sum(series.failed for series in everything),
+        steps=sum(len(series.values) - 1 for series in all_series),
+        failed=sum(series.failed for series in all_series),
         cut=cuts[0],
         steps_per_passage=fine.steps_per_passage,
         time_s=tuple(fine.column("time_s")),

@@ -33,12 +33,14 @@ def load_solution(path: str | Path) -> ContactSolution:
     Raises
     ------
     UnreadableFile
-        if the file is missing, damaged, or not a run of asperity.
+        if the file is missing, damaged, or not a saved asperity run.
     """
     path, remedy = Path(path), "solve its case again"
     dataset = read_netcdf(path, remedy)
     if "asperity_format" not in dataset.attrs:
-        raise UnreadableFile(f"{path} is netCDF but not a run of asperity; solve a case to get one")
+        raise UnreadableFile(
+            f"{path} is a netCDF file but not a saved asperity run; solve a case to create one"
+        )
     if dataset.attrs["asperity_format"] != FORMAT:
         raise UnreadableFile(
             f"{path} has run format {dataset.attrs['asperity_format']}, this asperity reads "
@@ -47,7 +49,7 @@ def load_solution(path: str | Path) -> ContactSolution:
     try:
         return _solution(dataset)
     except (ValueError, KeyError, TypeError, RuntimeError, AttributeError):
-        raise UnreadableFile(f"{path} is damaged or not a run of asperity; {remedy}") from None
+        raise UnreadableFile(f"{path} is damaged or not a saved asperity run; {remedy}") from None
 
 
 def _solution(dataset: "xarray.Dataset") -> ContactSolution:

@@ -12,7 +12,7 @@ import numpy as np
 
 from asperity.core.arrays import Field
 from asperity.core.errors import AsperityError, BadInput, UnreadableFile
-from asperity.core.limits import require_unpacked
+from asperity.core.limits import require_plausible_size
 from asperity.core.storage import digest
 from asperity.core.third_party import first_line
 
@@ -57,7 +57,7 @@ def read_maps(folder: Path, study: str, case_id: str) -> dict[str, Field]:
         group = zarr.open_group(path, mode="r", zarr_format=3)
         attributes = dict(group.attrs)
         arrays = dict(group.arrays())
-        require_unpacked(path, float(sum(array.nbytes for array in arrays.values())), REMEDY)
+        require_plausible_size(path, float(sum(array.nbytes for array in arrays.values())), REMEDY)
         maps = {name: np.asarray(array[...]) for name, array in sorted(arrays.items())}
     except UnreadableFile:
         raise

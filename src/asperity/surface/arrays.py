@@ -63,17 +63,17 @@ def read_netcdf(path: Path) -> RawMap:
 
 
 def array_map(name: str, heights: "np.ndarray | xarray.DataArray", form: str) -> RawMap:
-    """Return the map of an array of heights, in `unit` if it is an xarray with one.
+    """Return an array of heights as a map, with the unit of an xarray's attributes if it has one.
 
     Raises
     ------
     UnreadableFile
-        It has no two axes, is not of real numbers, or its coordinates are not evenly spaced.
+        It does not have two axes, is not of real numbers, or its coordinates are not evenly spaced.
     """
     if np.ndim(heights) != 2 or np.asarray(heights).dtype.kind not in "fiu":
         raise UnreadableFile(
-            f"{name} holds an array of {np.ndim(heights)} axes and type {np.asarray(heights).dtype}"
-            "; give heights along x and y"
+            f"{name} holds a {np.ndim(heights)}-dimensional array of type "
+            f"{np.asarray(heights).dtype}; give real heights along x and y"
         )
     if isinstance(heights, np.ndarray):
         return map_of_rows(np.ma.filled(np.ma.asarray(heights, dtype=np.float64), np.nan), form)

@@ -184,7 +184,7 @@ def _cylinder(measured: MeasuredSurface, heights: Field, finite: Mask) -> tuple[
 
     start = _cylinder_guess(at_x, at_y, z, measured.uniform)
     # the axis of a cylinder cannot be fitted to a profile
-    free = [0, 1, 2, 3, 4] if measured.uniform is None else [0, 1, 4]
+    free = [0, 1, 2, 3, 4] if measured.is_map else [0, 1, 4]
 
     def parameters(free_values: Field) -> Field:
         values = start.copy()

@@ -105,6 +105,11 @@ class MeasuredSurface:
             )
 
     @property
+    def is_map(self) -> bool:
+        """True for a map, False for a profile extended unchanged along one axis."""
+        return self.uniform is None
+
+    @property
     def missing(self) -> float:
         """Share of missing cells, 0 to 1."""
         return float(np.mean(~np.isfinite(self.heights)))

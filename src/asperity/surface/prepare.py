@@ -133,7 +133,7 @@ def _checked(
     surface: Surface, measured: MeasuredSurface, steps: tuple[str, ...], *, scaled: bool
 ) -> PreparedSurface:
     """Return the surface, with its lay, and a step where filter or sampling decide its slope."""
-    if measured.uniform is None and surface.sq > 0.0:
+    if measured.is_map and surface.sq > 0.0:
         steps = (*steps, lay_text(surface))
     pixels, grid = measured.grid.spacing, surface.grid
     slope = _height_statistics(surface.heights, grid).sdq

@@ -17,7 +17,7 @@ from asperity.contact.grid import MIN_CELLS
 from asperity.core.arrays import Field
 from asperity.core.errors import UnreadableFile, require_positive
 from asperity.core.files import require_file
-from asperity.core.limits import require_unpacked
+from asperity.core.limits import require_plausible_size
 from asperity.core.sandbox import read_in_subprocess
 from asperity.core.third_party import first_line, suppress_output, surface_topography
 from asperity.surface.arrays import NotForXarray, array_map, read_netcdf, read_numpy
@@ -212,7 +212,7 @@ def _first_bytes(path: Path) -> bytes:
         raise UnreadableFile(f"{path.name} is empty; {REMEDY}")
     if zipfile.is_zipfile(path):
         with zipfile.ZipFile(path) as archive:
-            require_unpacked(path, sum(part.file_size for part in archive.infolist()), REMEDY)
+            require_plausible_size(path, sum(part.file_size for part in archive.infolist()), REMEDY)
     return start
 
 

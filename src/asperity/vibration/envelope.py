@@ -1,6 +1,6 @@
-"""Squared envelope of a frequency band, and its modulation depth at the fault rates of a machine.
+"""Squared envelope of a frequency band, and its modulation depth at fault frequencies.
 
-`machine` computes these rates; `trend` evaluates whether a depth grows.
+`machine` computes these frequencies; `trend` evaluates whether a depth grows.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -20,7 +20,7 @@ from asperity.vibration.harmonics import (
 CHUNK_S = 4.0  # length of a Fourier transform [s]: lines 0.25 Hz apart
 BAND = (0.1, 0.4)  # of the sampling rate: above shafts and meshes, below the anti-alias filter
 MIN_SAMPLES = 64  # of an envelope
-MIN_LINES = 4.0  # spectral lines below a rate
+MIN_LINES = 4.0  # spectral lines below a fault frequency
 
 
 class Envelope:
@@ -84,10 +84,10 @@ class Envelope:
         return MIN_LINES * self.rate_hz / size, 0.5 * (BAND[1] - BAND[0]) * self.rate_hz
 
     def depths(self, rates_hz: Mapping[str, float]) -> dict[str, float]:
-        """Return the modulation depth (rms over mean) at each rate [Hz] with its first harmonics.
+        """Return the modulation depth (rms over mean) at each frequency [Hz] and its harmonics.
 
-        A harmonic that several rates share counts for the one whose own lines are present. nan if
-        the record is too short or the band too narrow for the rate.
+        A harmonic shared by several frequencies counts for the one whose own lines are present. nan
+        if the record is too short or the band too narrow for the frequency.
         """
         separable = separable_harmonics(rates_hz, self.spacing_hz)
         return {name: self._depth(rate, separable[name]) for name, rate in rates_hz.items()}

@@ -1,28 +1,31 @@
-"""Harmonics of fault rates that several rates share, and the rate to which their power belongs.
+"""Harmonics shared by several fault frequencies, and the one to which their power belongs.
 
-Rates of one bearing are often in the ratio of small whole numbers: 3 BPFO equals 2 BPFI where the
-balls measure a fifth of the pitch diameter. A line there does not tell which of the two is present.
+Fault frequencies of one bearing are often in the ratio of small whole numbers: 3 BPFO equals 2
+BPFI where the balls measure a fifth of the pitch diameter. A line there does not show which of the
+two is present.
 """
 
 from collections.abc import Mapping, Sequence
 
-HARMONICS = 3  # of each rate: the rate itself and the next two
-SLIP = 0.015  # relative tolerance of a rate: rolling elements slip by 1 to 2 %
-COMPARED = 2  # numbers of another rate's harmonics, over the harmonic's own; higher ones are weak
+HARMONICS = 3  # of each frequency: the fundamental and the next two
+SLIP = 0.015  # relative tolerance of a frequency: rolling elements slip by 1 to 2 %
+COMPARED = (
+    2  # numbers of another frequency's harmonics, over the harmonic's own; higher ones are weak
+)
 
 
 def separable_harmonics(
     rates_hz: Mapping[str, float], resolution_hz: float = 0.0
 ) -> dict[str, tuple[int, ...]]:
-    """Return the numbers of the harmonics of each rate that no other rate shares.
+    """Return the numbers of the harmonics of each fault frequency that no other shares.
 
-    A harmonic is shared if its frequencies and those of another rate's harmonic overlap, each
-    within slip or resolution. A rate itself is never shared. Rates that coincide themselves cannot
-    be separated; they keep their harmonics.
+    A harmonic is shared if its frequencies and those of another fault's harmonic overlap, each
+    within slip or resolution. The fundamental is never shared. Fault frequencies that coincide
+    cannot be separated; they keep their harmonics.
 
     Parameters
     ----------
-    rates_hz : rates by name [Hz]
+    rates_hz : fault frequencies by name [Hz]
     resolution_hz : spacing of spectral lines [Hz]
 
     Examples
@@ -47,15 +50,15 @@ def separable_harmonics(
 
 
 def attributed_power(powers: Sequence[float], separable: Sequence[int]) -> float:
-    """Return the power at a rate, of its harmonics in order.
+    """Return the power at a fault frequency, from the power of its harmonics.
 
-    A shared harmonic counts up to the strongest one that the rate does not share. So its power
-    belongs to the rate whose own lines are present, and its scatter to both as long as none is.
+    A shared harmonic counts up to the strongest one that is not shared. So its power belongs
+    to the fault whose own lines are present, and its scatter to both as long as none is.
 
     Parameters
     ----------
     powers : power of the first harmonics
-    separable : numbers of the harmonics that no other rate shares, as of `separable_harmonics`
+    separable : numbers of the harmonics that no other frequency shares, as of `separable_harmonics`
     """
     largest = max(powers[number - 1] for number in separable if number <= len(powers))
     return sum(
@@ -70,7 +73,7 @@ def tolerance_hz(frequency_hz: float, resolution_hz: float) -> float:
 
 
 def _is_shared(number: int, rate_hz: float, other_hz: float, resolution_hz: float) -> bool:
-    """Return whether a harmonic overlaps with a harmonic of another rate of another number."""
+    """Return whether a harmonic overlaps with a harmonic of another frequency and number."""
     if _overlap(rate_hz, other_hz, resolution_hz):
         return False
     return any(

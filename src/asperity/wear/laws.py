@@ -45,7 +45,7 @@ class RubbingConditions:
 
 
 class RemovalLaw(Protocol):
-    """Law of removal: a frozen dataclass of parameters."""
+    """Wear law: a frozen dataclass of parameters."""
 
     needs_temperature: ClassVar[bool]
 

@@ -57,7 +57,7 @@ class Passage:
     body : 0 or 1, the first or the second
     grid : of the track, which repeats along x (rolling)
     heights : of the track after the jump's removal [m], shape (nx, ny); positive is material
-    removed : depth that the law of removal takes in this jump [m], 0 or more
+    removed : depth that the wear law removes in this jump [m], 0 or more
     patches : contact at positions spaced evenly along the track: the mean over them, times the
         track's length, is a point's integral along a passage
     material : of this body

@@ -45,7 +45,7 @@ class Scuffing(Parametric):
             )
 
     def __call__(self, passage: Passage) -> Change:
-        """Return the removal in excess of the law of removal."""
+        """Return the removal in excess of the wear law."""
         load = np.zeros(passage.grid.cells)
         scuffed = np.zeros(passage.grid.cells)
         for patch in passage.patches:

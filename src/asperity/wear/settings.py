@@ -25,7 +25,7 @@ class WearModel:
 
     Parameters
     ----------
-    law : law of removal
+    law : wear law
     coefficients : k of each body in that law
     flattening : keep the plastic flattening by the pressure cap
     mechanisms : mechanisms that roughen, by key of MECHANISMS, in the order of their application
@@ -72,5 +72,5 @@ class WearModel:
 
     @property
     def only_removal(self) -> bool:
-        """True if only the law of removal acts: the result then depends on k times time alone."""
+        """True if only the wear law acts: the result then depends on k times time alone."""
         return not self.flattening and not self.mechanisms

@@ -287,7 +287,7 @@ def _acknowledged(overalls: OverallValues, time: str | None) -> int:
     numbers = [number for number, place in enumerate(places, 1) if place == stamp]
     if not numbers:
         raise BadInput(
-            f"{time} is no time stamp of {overalls.path.name}; acknowledge one, such as "
-            f"{places[-1]}, or {LAST}"
+            f"{time} is not a time stamp of {overalls.path.name}; acknowledge one of them, such as "
+            f"{places[-1]}, or {LAST!r} for the newest"
         )
     return numbers[-1]

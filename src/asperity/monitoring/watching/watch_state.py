@@ -393,7 +393,8 @@ def _acknowledged_name(acknowledge: str, keys: Sequence[FileVersion]) -> str:
         if acknowledge in (key.file, file_name(key)):
             return file_name(key)
     raise BadInput(
-        f"{acknowledge} is not among the {len(keys)} recordings; acknowledge one of them, or {LAST}"
+        f"{acknowledge} is not among the {len(keys)} recordings; acknowledge one of "
+        f"them, or {LAST!r} for the newest"
     )
 
 

@@ -40,8 +40,7 @@ def _surface_figure(description: SurfaceDescription) -> Figure:
     spectrum = surface_spectrum(description.levelled)
     figure = Figure(figsize=(11.0, 7.4), layout="constrained")
     layout = figure.add_gridspec(2, 3, height_ratios=(1.25, 1.0))
-    is_map = levelled.uniform is None
-    if is_map:
+    if levelled.is_map:
         _draw_levelled_map(figure, figure.add_subplot(layout[0, :2]), levelled)
         _draw_lay(figure.add_subplot(layout[0, 2], projection="polar"), spectrum)
         left = figure.add_subplot(layout[1, 0])
@@ -54,19 +53,19 @@ def _surface_figure(description: SurfaceDescription) -> Figure:
         draw_height_distribution(left, levelled.profile, rms)
     curve, radial = (figure.add_subplot(layout[1, column]) for column in (1, 2))
     _draw_bearing_curve(curve, description)
-    _draw_radial_spectrum(radial, spectrum, profile=not is_map)
-    title = f"{description.path.name}: {_size(description)}"
+    _draw_radial_spectrum(radial, spectrum, profile=not levelled.is_map)
+    title = f"{description.path.name}: {_size_text(description)}"
     figure.suptitle(title, x=0.01, ha="left", parse_math=False)
     return figure
 
 
-def _size(description: SurfaceDescription) -> str:
+def _size_text(description: SurfaceDescription) -> str:
     """Return Sq or Rq, the number of pixels or points and their spacing as text."""
     levelled = description.levelled
     pixel = quantity("cell_m")
     sq = quantity("sq_m").text(description.parameters.sq)
     (dx, dy) = levelled.grid.spacing
-    if levelled.uniform is None:
+    if levelled.is_map:
         nx, ny = levelled.grid.cells
         return f"Sq {sq}, {nx} × {ny} pixels of {pixel.number(dx)} × {pixel.text(dy)}"
     points = f"{levelled.profile.size} points every {pixel.text(min(dx, dy))}"

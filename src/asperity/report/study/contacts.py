@@ -48,8 +48,8 @@ def contact_maps(runs: Sequence[Run]) -> Exhibit:
     )
 
 
-def surfaces(runs: Sequence[Run]) -> Exhibit:
-    """Map the roughness of each run in one colour scale (Fig 5 of the paper)."""
+def surface_maps(runs: Sequence[Run]) -> Exhibit:
+    """Map the roughness of each run on a common colour scale (Fig 5 of the paper)."""
 
     def draw(medium: Medium) -> Figure:
         key = "surface_height"
@@ -67,7 +67,7 @@ def surfaces(runs: Sequence[Run]) -> Exhibit:
     return Exhibit(
         "surfaces",
         draw,
-        "The same surfaces before deformation, in one colour scale.",
+        "The same surfaces before deformation, on a common colour scale.",
         f"Maps of the surface heights at {', '.join(_sq(run) for run in runs)}.",
     )
 

@@ -91,7 +91,7 @@ def study_exhibits(study: StudyOverview) -> list[Exhibit]:
         return list(sweep_exhibits(study))
     exhibits = [*curve_exhibits(study, study.curve), *dynamic_exhibits(study, study.curve)]
     if study.runs and not isinstance(study.runs, str):
-        exhibits += [contacts.contact_maps(study.runs), contacts.surfaces(study.runs)]
+        exhibits += [contacts.contact_maps(study.runs), contacts.surface_maps(study.runs)]
     return exhibits
 
 

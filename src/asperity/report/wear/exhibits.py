@@ -200,7 +200,7 @@ def _draw_paper_values(left: Axes, right: Axes) -> None:
     )
 
 
-def surfaces(track: WornTrack) -> Exhibit:
+def surface_maps(track: WornTrack) -> Exhibit:
     """Map a track before and after wear, and the depth lost."""
 
     def draw(medium: Medium) -> Figure:
@@ -223,8 +223,8 @@ def surfaces(track: WornTrack) -> Exhibit:
     return Exhibit(
         f"surface-{track.name.split()[0].lower()}",
         draw,
-        f"{track.name}: track new and worn in one colour scale, each about its mean, and depth "
-        "lost.",
+        f"{track.name}: track new and worn on a common colour scale, each about its mean, and "
+        "depth lost.",
         f"Maps of the {track.name.lower()}'s heights before and after, and of the depth lost",
     )
 

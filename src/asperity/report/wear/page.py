@@ -79,7 +79,7 @@ def render_wear_page(history: WearHistory) -> str:
         resonance=_resonance(history),
         maps=animated_maps.animated_maps(history.case, scale),
         curves=exhibits.curves(history).picture(),
-        surfaces=[exhibits.surfaces(track).picture() for track in tracks],
+        surfaces=[exhibits.surface_maps(track).picture() for track in tracks],
         profiles=exhibits.profiles(tracks).picture() if tracks else None,
         contact=[_row(key, table[key].iloc[0], last[key]) for key in CONTACT],
         bodies=_bodies(last),

@@ -85,12 +85,12 @@ class WearingContact(WearingTracks):
         return worst
 
     def rubbing(self, solved: SolvedPosition, body: int) -> RubbingConditions:
-        """Return the input of the law of removal for a body at a position."""
+        """Return the input of the wear law for a body at a position."""
         needed = self.model.law.needs_temperature
         if needed and solved.temperatures is None:
             raise BadInput(
-                f"{self.case.source}: the temperature of the contact is not known; "
-                "choose another law of removal"
+                f"{self.case.source}: the wear law needs the contact temperature, which could "
+                "not be computed; choose another law"
             )
         temperature = None
         if needed and solved.temperatures is not None:
