@@ -113,7 +113,7 @@ def test_contradicting_sensitivities_are_refused(tmp_path):
     ("header", "unit", "remark"),
     [
         ("name: a", "V", "values are in V and no sensitivity is stated; state it, such as"),
-        ("Sensitivity: high", "mV", "in mV and 'high' is no sensitivity; state it"),
+        ("Sensitivity: high", "mV", "in mV and 'high' is not a sensitivity; state it"),
         ("Sensitivity: 100 mV/g", "-", "a sensitivity of 100 mV/g is stated, but no unit of the"),
     ],
 )

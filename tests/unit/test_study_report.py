@@ -392,7 +392,7 @@ def test_maps_show_the_contact_of_the_study(overview_of_wear, wear):
 
 
 def test_surfaces_share_one_scale(overview_of_wear):
-    figure = contacts.surfaces(overview_of_wear.runs).figure(ON_PAPER)
+    figure = contacts.surface_maps(overview_of_wear.runs).figure(ON_PAPER)
     images = [axes.images[0] for axes in figure.axes if axes.images]
     assert len({image.get_clim() for image in images}) == 1
     spread = [float(np.std(image.get_array())) for image in images]

@@ -162,7 +162,7 @@ def test_without_sliding_there_is_no_wear():
         history.final_surfaces.first.heights, history.initial_surfaces.first.heights
     )
     assert len(history.table) == 2
-    assert "There is no sliding, so nothing wears off." in history.notes
+    assert "There is no sliding, so no wear occurs." in history.notes
 
 
 def test_the_energy_law_equals_archard_with_k_over_the_boundary_friction():

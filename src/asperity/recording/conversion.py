@@ -141,7 +141,7 @@ def _without_sensitivity(channel: Channel, unit: str, stated: Mapping[str, Fact]
     """Return what is missing for volts, and why a stated sensitivity is not used."""
     text = stated["sensitivity"].value if "sensitivity" in stated else channel.sensitivity
     if voltage_scale(unit) is not None:
-        known = "no sensitivity is stated" if text is None else f"{text!r} is no sensitivity"
+        known = "no sensitivity is stated" if text is None else f"{text!r} is not a sensitivity"
         return [
             f"values are in {unit} and {known}; state it, such as "
             f'sensitivity = "{EXAMPLE}", in a sidecar'

@@ -295,7 +295,8 @@ def _profile(path: Path, x: Field, z: Field, form: str, unit: str | None) -> Raw
     steps = np.diff(x)
     if x.size < MIN_CELLS or not (steps > 0.0).all():
         raise UnreadableFile(
-            f"{path.name} is no profile of at least {MIN_CELLS} points with increasing x; {REMEDY}"
+            f"{path.name} is not a profile of at least {MIN_CELLS} points with increasing x; "
+            f"{REMEDY}"
         )
     step = float(x[-1] - x[0]) / (x.size - 1)
     notes: tuple[str, ...] = ()

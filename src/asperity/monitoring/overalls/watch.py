@@ -32,7 +32,7 @@ class OverallUpdate:
 
 @dataclass
 class _Memory:
-    """What a later watch needs: the acknowledged time stamp, and what recipients know."""
+    """Stored state of a watch: the acknowledged time stamp and the notified states."""
 
     path: Path
     acknowledged: str | None = None

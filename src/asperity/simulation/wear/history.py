@@ -360,7 +360,7 @@ class WearHistory:
                 "their jumps."
             )
         if self.case.conditions.sliding_speed == 0.0:
-            notes.append("There is no sliding, so nothing wears off.")
+            notes.append("There is no sliding, so no wear occurs.")
         notes += history_notes(contact, self.table, self.worn)
         acting = [name for name in ("fatigue", "ploughing", "scuffing") if name in model.mechanisms]
         acting += ["flattening"] if model.flattening else []
