@@ -64,14 +64,16 @@ def level_state(alarm: Alarm, recordings: Sequence[TrackedRecording]) -> JsonObj
     }
 
 
-def causes(alarm: Alarm, recordings: Sequence[TrackedRecording], silent: str = "") -> list[str]:
+def causes(
+    alarm: Alarm, recordings: Sequence[TrackedRecording], silence_reason: str = ""
+) -> list[str]:
     """Return the kinds of causes that are active: contact, level, silence, zone."""
     kinds = {"level"} if alarm.level.state != "none" else set()
     named = {ZONE: ZONE} | dict.fromkeys(CONTACT_SOURCES, "contact")
     if alarm.state in ("alert", "alarm"):
         raised = filter(None, (alarm.raised_by, alarm.raised_since))
         kinds |= {named.get(source, "level") for source in raised}
-    if silent:
+    if silence_reason:
         kinds.add(SILENCE)
     if len(recordings) > 1 and all(recording.zone in ("C", "D") for recording in recordings[-2:]):
         kinds.add(ZONE)
@@ -79,12 +81,12 @@ def causes(alarm: Alarm, recordings: Sequence[TrackedRecording], silent: str = "
 
 
 def sensor_state(
-    alarm: Alarm, recordings: Sequence[TrackedRecording], silent: str = ""
+    alarm: Alarm, recordings: Sequence[TrackedRecording], silence_reason: str = ""
 ) -> JsonObject:
     """Return whether the sensor delivers usable recordings, and why not."""
     last = recordings[-1]
-    if alarm.state == "blind" or silent:
-        return {"state": "blind", "reason": silent or alarm.reason}
+    if alarm.state == "blind" or silence_reason:
+        return {"state": "blind", "reason": silence_reason or alarm.reason}
     if last.dead:
         return {"state": "blind", "reason": last.reading.reason}
     return {"state": "ok", "reason": ""}

@@ -64,7 +64,7 @@ class Track:
     requested, and decide labels, probabilities and alarm; `stages_by` has all three. Without a
     resonance of the contact these are None and empty. `evidence` states why the line belongs to
     the contact, empty for a line of unknown origin. `problems` are reasons not to compare
-    recordings; `notes` state choices made for the user. `silent` states that recordings are
+    recordings; `notes` state choices made for the user. `silence_reason` states that recordings are
     overdue. `forecast` is None unless requested.
     """
 
@@ -79,7 +79,7 @@ class Track:
     problems: tuple[str, ...]
     notes: tuple[str, ...]
     evidence: str = ""
-    silent: str = ""
+    silence_reason: str = ""
     forecast: ForecastResult | None = None
 
     @property
@@ -104,7 +104,7 @@ class Track:
     def overdue(self, reason: str) -> "Track":
         """Return the track with recordings overdue: blind, unless an alarm is active."""
         sentence = f"{reason[:1].upper()}{reason[1:]}."
-        track = replace(self, notes=(*self.notes, sentence), silent=reason)
+        track = replace(self, notes=(*self.notes, sentence), silence_reason=reason)
         if self.alarm.state == "alarm":
             return track
         states: tuple[AlarmState, ...] = (*self.alarm.states[:-1], "blind")
@@ -212,7 +212,7 @@ class Track:
             "alarm": self._alarm_row(),
             "contact": contact_state(self.recordings, self.evidence),
             "level": level_state(self.alarm, self.recordings),
-            "sensor": sensor_state(self.alarm, self.recordings, self.silent),
+            "sensor": sensor_state(self.alarm, self.recordings, self.silence_reason),
             "forecast": None if self.forecast is None else self.forecast.scalars(),
             "x": self.x_name,
             "band_hz": list(self.target.band_hz),
@@ -234,7 +234,7 @@ class Track:
             "raised_by": alarm.raised_by or None,
             "explained": alarm.explained or None,
             "verdict": alarm.verdict,
-            "causes": causes(alarm, self.recordings, self.silent),
+            "causes": causes(alarm, self.recordings, self.silence_reason),
         }
 
     @property
