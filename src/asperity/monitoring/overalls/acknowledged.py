@@ -52,8 +52,7 @@ def _last_place(overalls: OverallValues, stamp: str) -> int:
     """Return the number of the last row with a time stamp, counted from 1; 0 without one."""
     places = [number for number, text in enumerate(overalls.stamps, 1) if text.strip() == stamp]
     if not places and overalls.times:
-        zoned = overalls.times[0].endswith("Z")
-        text = _iso(stamp, zoned=zoned)
+        text = _iso(stamp)
         if text:
             starts = enumerate(overalls.times, 1)
             places = [number for number, time in starts if time.startswith(text)]
@@ -66,7 +65,7 @@ def _last_place(overalls: OverallValues, stamp: str) -> int:
     return places[-1] if places else 0
 
 
-def _iso(stamp: str, *, zoned: bool) -> str:
+def _iso(stamp: str) -> str:
     """Return a stamp as `times` begin, as precise as it is; "" for other text."""
     try:
         time = datetime.fromisoformat(stamp)

@@ -38,7 +38,7 @@ _CONDITION_NAMES = {
     "load_n": re.compile(r"\b(?:load|last|force|kraft)\b"),
 }
 _CONDITION_UNITS = {  # units that leave no doubt about the key
-    "temperature_degc": ("degC", "degc", "°C", "degF", "degf", "°F"),
+    "temperature_degc": ("degC", "degc", "°C", "degF", "degf", "°F", "K"),
     "speed_hz": ("rpm", "RPM", "1/min", "min-1", "rps"),
     "load_n": ("N", "kN", "MN"),
 }
@@ -104,7 +104,7 @@ def sort_columns(
         if numbers.texts:
             columns.notes.append(
                 f"Column {heading} has {numbers.texts} entries without a number, such as "
-                f"{numbers.example[:40]}; they count as missing."
+                f"{numbers.example}; they count as missing."
             )
         if not _add_condition(columns, heading, numbers.values, file):
             headings.append(heading)
@@ -131,7 +131,7 @@ def _reason_to_omit(heading: str, numbers: ColumnNumbers) -> str:
     if numbers.booleans and filled.size <= numbers.booleans:
         return "holds true and false"
     if not filled.size:
-        return f"holds text, such as {numbers.example[:40]}," if numbers.texts else "is empty"
+        return f"holds text, such as {numbers.example}," if numbers.texts else "is empty"
     if filled.size < min(FEWEST_NUMBERS, values.size):
         return f"has only {filled.size} numbers in {values.size} rows"
     if _counts_rows(values):
@@ -144,7 +144,7 @@ def _reason_to_omit(heading: str, numbers: ColumnNumbers) -> str:
 
 def _counts_rows(values: Field) -> bool:
     """Return whether values are successive whole numbers, as of a row number."""
-    steps = np.diff(values)
+    steps = np.diff(np.where(np.isfinite(values), values, np.nan))
     return values.size >= FEWEST_NUMBERS and bool((steps == 1.0).all() or (steps == -1.0).all())
 
 
@@ -167,7 +167,9 @@ def _value_names(headings: list[str]) -> dict[str, str]:
     short = {heading: heading_parts(heading)[0] for heading in headings}
     names = [*short.values()]
     return {
-        heading: heading if names.count(name) > 1 else f"{name} (column)"
+        heading: heading
+        if names.count(name) > 1
+        else f"{name} (column)"
         if name in RESERVED
         else name
         for heading, name in short.items()
@@ -195,15 +197,13 @@ def _add_condition(columns: ColumnSet, heading: str, values: Field, file: str) -
         columns.notes.append(f"{key} is given in at most half of the rows and is not used.")
     elif key != "temperature_degc" and (values[known] <= 0.0).any():
         count = int((values[known] <= 0.0).sum())
-        columns.notes.append(f"{key} is 0 or below in {count} rows and is not used.")
+        columns.notes.append(f"{key} is 0 or below in some rows ({count}) and is not used.")
     return True
 
 
 def _condition_key(name: str, unit: str) -> str:
     """Return the key of the operating condition that a column states, or ""."""
-    by_unit = next(
-        (key for key, units in _CONDITION_UNITS.items() if unit in units), ""
-    )
+    by_unit = next((key for key, units in _CONDITION_UNITS.items() if unit in units), "")
     if by_unit:
         return by_unit
     words = words_of(name)

@@ -16,11 +16,12 @@ from asperity.monitoring.alarm import LEVEL_LEAST, ratio_text
 from asperity.monitoring.operating_point import LEVEL, USUAL_OIL, OperatingPoint, conditions_of
 from asperity.monitoring.overalls.acknowledged import acknowledged_rows, row_name
 from asperity.monitoring.overalls.columns import is_logarithmic
+from asperity.monitoring.overalls.row_levels import RowLevels
 from asperity.monitoring.overalls.sensors import blind_sensors
 from asperity.monitoring.overalls.table import OverallValues, read_overalls
 from asperity.monitoring.overalls.zones import lasting_zone, velocity_zones
 from asperity.monitoring.states import ZONE
-from asperity.trend import AlarmState, LevelJudgement, LevelMonitors, MonitoredSeries
+from asperity.trend import AlarmState, LevelJudgement, MonitoredSeries
 
 NO_SPECTRUM = "overall values have no spectrum"
 DECIBEL = np.log(10.0) / 20.0  # of an amplitude
@@ -167,15 +168,20 @@ def track_overalls(path: str | Path, *, acknowledge: str | None = None) -> Overa
 
 def judge_overalls(overalls: OverallValues, first: int) -> OverallTrack:
     """Judge overall values from a row on; those before it are acknowledged."""
-    levels = LevelMonitors(_monitored(overalls), overalls.x.size, first)
+    levels = RowLevels(_monitored(overalls), overalls.x.size, first)
     zones, notes = velocity_zones(overalls)
     states: list[AlarmState] = ["none"] * first
     decision = _Decision("none", "all rows are acknowledged")
     for number in range(first, overalls.x.size):
         levels.add(number)
         if decision.state != "alarm":  # latched
-            decision = _decide(levels, lasting_zone(zones, number, first))
-        states.append(decision.state)
+            zone = lasting_zone(zones, number, first) if zones else ("", "")
+            state = _state(levels, zone[0])
+            if state == "alarm" or number == overalls.x.size - 1:
+                decision = _decide(levels, zone)
+            states.append(state)
+        else:
+            states.append("alarm")
     blind = blind_sensors(overalls)
     reason = "; ".join(blind.values())
     if len(blind) == len(overalls.values) and decision.state != "alarm":
@@ -204,17 +210,23 @@ class _Decision(NamedTuple):
     raised_by: str = ""
 
 
-def _decide(levels: LevelMonitors, zone: tuple[str, str]) -> _Decision:
-    """Decide the state after a row from the levels and the lasting zone."""
-    level = levels.judgement()
-    letter, reason = zone
-    if letter == "D" and level.state != "alarm":
-        return _Decision("alarm", reason, ZONE)
-    if letter == "C" and level.state == "none":
-        return _Decision("alert", reason, ZONE)
-    if level.state == "none" and not levels.complete:
-        return _Decision("cannot-tell", "baseline incomplete: fewer than 8 rows with values")
-    return _Decision(level.state, level.reason, "" if level.state == "none" else level.name)
+def _state(levels: RowLevels, letter: str) -> AlarmState:
+    """Return the state after a row from the levels and the lasting zone."""
+    if letter == "D" or levels.state == "alarm":
+        return "alarm"
+    if letter == "C" or levels.state == "alert":
+        return "alert"
+    return "none" if levels.complete else "cannot-tell"
+
+
+def _decide(levels: RowLevels, zone: tuple[str, str]) -> _Decision:
+    """Return the state after a row with its reason."""
+    level, state = levels.judgement(), _state(levels, zone[0])
+    if state == "cannot-tell":
+        return _Decision(state, "baseline incomplete: fewer than 8 rows with values")
+    if state != levels.state:
+        return _Decision(state, zone[1], ZONE)
+    return _Decision(state, level.reason, "" if state == "none" else level.name)
 
 
 def _since(states: Sequence[AlarmState]) -> int | None:
@@ -271,7 +283,7 @@ def _unmeasured(overalls: OverallValues) -> list[str]:
         if not is_logarithmic(overalls.units[name]):
             counts["0 or below"] = int((values[np.isfinite(values)] <= 0.0).sum())
         notes += [
-            f"{name} is {kind} in {count} rows, which have no level."
+            f"{name} is {kind} in {count} row{'s' * (count > 1)} without a level."
             for kind, count in counts.items()
             if count
         ]

@@ -19,7 +19,7 @@ _GRAMMARS = {  # by decimal mark; thousands are separated by the other one
 }
 _OTHER_MARK = {".": ",", ",": "."}
 _DIGIT = r"\d"
-_SPACED = r"(\d)['’\u00a0\u202f ](\d{3})"  # thousands separated by a space or an apostrophe
+_SPACED = r"[-+]?\d{1,3}(?:['’\u00a0\u202f ]\d{3})+(?:[.,]\d*)?"  # 1 200,5 or 1'200.5
 _MISSING = ("", "nan", "null", "none", "n/a", "#n/a", "na", "-", "--")
 _INFINITE = {"inf": np.inf, "+inf": np.inf, "infinity": np.inf, "-inf": -np.inf}
 _INFINITE["-infinity"] = -np.inf
@@ -75,30 +75,37 @@ def column_numbers(column: Column, mark: str) -> ColumnNumbers:
         return ColumnNumbers(np.full(len(column), np.nan), booleans=len(column))
     if pandas.api.types.is_numeric_dtype(column):
         return ColumnNumbers(column.to_numpy(dtype=float, na_value=np.nan))
-    values = np.full(len(column), np.nan)
-    booleans = nested = 0
-    textual = np.ones(len(column), dtype=bool)
     if column.dtype == object:
-        textual = np.array([isinstance(entry, str) for entry in column], dtype=bool)
-        for number in np.flatnonzero(~textual):
-            entry = column.iloc[number]
-            booleans += isinstance(entry, bool)
-            nested += isinstance(entry, list | dict | tuple | np.ndarray)
-            values[number] = _as_float(entry)
-    elif not pandas.api.types.is_string_dtype(column):
-        return ColumnNumbers(values, texts=int(column.notna().sum()), example="a date")
-    text = _tidy(column[textual].fillna("").astype("str"))
-    parsed, other = _parsed(text, mark)
-    values[textual] = parsed
-    logical = text[other].str.lower().isin(("true", "false")).to_numpy(dtype=bool)
-    words = text[other][~logical]
-    return ColumnNumbers(
-        values,
-        texts=len(words),
-        example=str(words.iloc[0]) if len(words) else "",
-        booleans=booleans + int(logical.sum()),
-        nested=nested,
+        return _object_numbers(column, mark)
+    if not pandas.api.types.is_string_dtype(column):
+        count = int(column.notna().sum())
+        return ColumnNumbers(np.full(len(column), np.nan), texts=count, example="a date")
+    return _text_numbers(column, mark)
+
+
+def _object_numbers(column: Column, mark: str) -> ColumnNumbers:
+    """Return the numbers of a column of JSON values."""
+    entries = [*column]
+    textual = np.array([isinstance(entry, str) for entry in entries], dtype=bool)
+    values = np.array([_as_float(entry) for entry in entries], dtype=float)
+    numbers = _text_numbers(column[textual].astype("str"), mark)
+    values[textual] = numbers.values
+    return numbers._replace(
+        values=values,
+        booleans=numbers.booleans + sum(isinstance(entry, bool) for entry in entries),
+        nested=sum(isinstance(entry, list | dict | tuple | np.ndarray) for entry in entries),
     )
+
+
+def _text_numbers(column: Column, mark: str) -> ColumnNumbers:
+    """Return the numbers of a column of text."""
+    text = _tidy(column.fillna(""))
+    values, other = _parsed(text, mark)
+    words = text[other]
+    logical = np.asarray(words.str.lower().isin(("true", "false")), dtype=bool)
+    words = words[~logical]
+    example = " ".join(str(words.iloc[0]).split())[:40] if len(words) else ""
+    return ColumnNumbers(values, len(words), example, int(logical.sum()))
 
 
 def _as_float(entry: object) -> float:
@@ -134,7 +141,7 @@ def _matches(text: Column, mark: str) -> Mask:
 def _tidy(text: Column) -> Column:
     """Return texts without outer blanks, and without blanks or apostrophes between thousands."""
     text = text.str.strip()
-    spaced = text.str.fullmatch(r"[-+]?\d{1,3}(?:['’\u00a0\u202f ]\d{3})+(?:[.,]\d*)?")
+    spaced = text.str.fullmatch(_SPACED)
     if not np.asarray(spaced, dtype=bool).any():
         return text
     return text.where(~spaced, text.str.replace(r"['’\u00a0\u202f ]", "", regex=True))

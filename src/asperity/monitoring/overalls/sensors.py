@@ -31,11 +31,7 @@ def _reason(values: Field, *, logarithmic: bool) -> str:
     if last <= 0.0 and not logarithmic:
         return "has no value above 0 in the last row"
     numbers = values[np.isfinite(values)]
-    if (
-        numbers.size > 2 * STUCK
-        and np.ptp(numbers[-STUCK:]) == 0.0
-        and _varies(numbers[:-STUCK])
-    ):
+    if numbers.size > 2 * STUCK and np.ptp(numbers[-STUCK:]) == 0.0 and _varies(numbers[:-STUCK]):
         return f"has not changed in the last {STUCK} rows"
     return ""
 

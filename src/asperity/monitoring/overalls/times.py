@@ -139,18 +139,23 @@ def _numeric_axis(stamps: Column, name: str, mark: str, path: Path) -> tuple[Tim
         form = "YYYYMMDDhhmmss"[: len(example)]
         note = f"Times such as {example} are read as {form}."
         return _date_axis(dates, [name], texts, path), note
-    middle = float(np.median(np.abs(finite)))
-    if middle < SMALLEST_EPOCH:
+    if float(np.median(np.abs(finite))) < SMALLEST_EPOCH:
         return TimeAxis(numbers, name_and_unit(name)[1] or "", [], texts, [name]), ""
+    return _date_axis(_epoch_dates(numbers, name, path), [name], texts, path), ""
+
+
+def _epoch_dates(numbers: Field, name: str, path: Path) -> Column:
+    """Return the dates of seconds, milliseconds, microseconds or nanoseconds since 1970."""
+    known = np.isfinite(numbers)
+    middle = float(np.median(np.abs(numbers[known])))
     per_second = next(per_second for limit, per_second in EPOCHS if middle < limit)
-    ticks = np.where(np.isfinite(numbers), numbers, 0.0) * (1e9 / per_second)
+    ticks = np.where(known, numbers, 0.0) * (1e9 / per_second)
     if np.abs(ticks).max() > LARGEST_TICKS:
         raise BadInput(
-            f"column {name} of {path.name} has times up to {np.abs(finite).max():.3g}, which are no "
-            "seconds since 1970; write ISO 8601"
+            f"column {name} of {path.name} has times up to {np.abs(numbers[known]).max():.3g}, "
+            "which are no seconds since 1970; write ISO 8601"
         )
-    dates = pandas.Series(np.rint(ticks).astype("M8[ns]")).where(np.isfinite(numbers))
-    return _date_axis(dates, [name], texts, path), ""
+    return pandas.Series(np.rint(ticks).astype("M8[ns]")).where(known)
 
 
 def _calendar_dates(numbers: Field) -> "Column | None":
@@ -221,9 +226,7 @@ def _read_dates(text: Column) -> tuple[Column, str]:
 
 
 def _in_order(text: Column, *, day_first: bool) -> Column:
-    return pandas.to_datetime(
-        text, errors="coerce", format="mixed", dayfirst=day_first, utc=True
-    )
+    return pandas.to_datetime(text, errors="coerce", format="mixed", dayfirst=day_first, utc=True)
 
 
 def _unevenness(dates: Column) -> float:
