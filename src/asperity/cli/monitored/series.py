@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from os import environ
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
@@ -81,7 +82,8 @@ def track_series(options: SimpleNamespace) -> None:
 def _refuse_others(options: SimpleNamespace, unused: Mapping[str, tuple[str, object]]) -> None:
     """Raise BadInput for an option that overall values do not use and that is not its default."""
     for option, (name, default) in unused.items():
-        if getattr(options, name, default) not in (default, []):
+        value = getattr(options, name, default)
+        if value not in (default, []) and value != environ.get(f"ASPERITY_{name.upper()}"):
             raise BadInput(f"{option} does not apply to a table of overall values; leave it out")
 
 
