@@ -138,8 +138,9 @@ def _without_pairs(edges: Field, per_turn: float) -> _Pulses:
         return _Pulses(edges[first], 2.0 * single, ())
     if THIRD_MISSING[0] < short < THIRD_MISSING[1]:
         raise BadInput(
-            f"the tacho's intervals alternate as {short:.2g} to {1.0 - short:.2g}, of two marks or "
-            "because every third pulse is missing; use another channel"
+            f"the tacho's intervals alternate as {short:.2g} to {1.0 - short:.2g}, because every "
+            f"third pulse is missing or of two marks; state pulses_per_turn = {2.0 * per_turn:g} "
+            "for two marks, or use another channel"
         )
     remark = (
         f"the tacho has two pulses in place of one, at {short:.2g} and {1.0 - short:.2g} of its "

@@ -44,7 +44,12 @@ class _Memory:
         """Return the stored memory; empty if there is none, or it is damaged."""
         try:
             stored = json.loads(path.read_text("utf-8"))
-            return cls(path, stored["acknowledged"], dict(stored["known"]))
+            stamp = stored["acknowledged"]
+            known = {
+                str(name): {"state": of["state"], "causes": [*of["causes"]]}
+                for name, of in dict(stored["known"]).items()
+            }
+            return cls(path, None if stamp is None else str(stamp), known)
         except (OSError, ValueError, KeyError, TypeError):
             return cls(path)
 
