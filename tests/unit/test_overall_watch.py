@@ -1,6 +1,7 @@
 """Watch of a growing table of overall values: updates, notifications, memory, failures."""
 
 import json
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -61,12 +62,10 @@ def run(tmp_path, monkeypatch):
             settle_time_s=0.0, once=once, notifiers=() if recipient is None else (recipient,)
         )
         updates = []
-        try:
-            path = tmp_path / "t.csv"
-            for update in watch_overalls(path, out, settings, acknowledge=acknowledge):
-                updates.append(update)
-        except Finished:
-            pass
+        with suppress(Finished):
+            updates.extend(
+                watch_overalls(tmp_path / "t.csv", out, settings, acknowledge=acknowledge)
+            )
         return updates
 
     return start
@@ -97,9 +96,11 @@ def test_an_unreadable_table_is_stated_once_and_its_return(run, tmp_path):
         lambda: rows(path, 41),
     )
     assert states(updates) == ["none", None, "none"]
-    (begun,), (ended,) = updates[1].failed, updates[2].failed
-    assert begun.startswith("t.csv: line 2 has 3 fields, the heading 2; the last evaluation stands")
-    assert ended == "t.csv can be read again"
+    (failure,), (recovery,) = updates[1].failed, updates[2].failed
+    assert failure.startswith(
+        "t.csv: line 2 has 3 fields, the heading 2; the last evaluation stands"
+    )
+    assert recovery == "t.csv can be read again"
 
 
 def test_a_table_that_is_still_written_waits(tmp_path, monkeypatch):

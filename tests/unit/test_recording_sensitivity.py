@@ -149,7 +149,7 @@ def test_decimal_marks_and_thousands(text, volts):
 
 
 def test_a_number_that_reads_in_two_ways_is_refused():
-    with pytest.raises(BadInput, match="of 1,000 mV/g may be 1.000 or 1000 mV/g; write it without"):
+    with pytest.raises(BadInput, match=r"may be 1\.000 or 1000 mV/g; write it"):
         parse_sensitivity("1,000 mV/g")
 
 

@@ -70,7 +70,8 @@ def sensitivity_text(attributes: Iterable[tuple[str, object]]) -> str | None:
     """Return the sensitivity stated among named values, with its unit; None without one.
 
     The first value that is a sensitivity in volts counts: calibration dates and transverse
-    sensitivities have the word in their names too. Several values, one for each channel, are separated by semicolons.
+    sensitivities have the word in their names too. Several values, one for each channel, are
+    separated by semicolons.
     """
     named = {str(key): _text(value) for key, value in attributes if _NAMED.search(str(key))}
     units = [text for key, text in named.items() if _UNIT.search(key)]

@@ -53,8 +53,9 @@ def time_axis(table: pandas.DataFrame, marks: dict[str, str], path: Path) -> tup
     if len(names) == 2:
         stamps = stamps.astype("str").str.strip() + " " + table[names[1]].astype("str").str.strip()
     dates, note = _dates(stamps)
-    texts = [] if pandas.api.types.is_datetime64_any_dtype(stamps) else stamps.astype("str")
-    return _date_axis(dates, names, [*texts], path), note
+    dated = pandas.api.types.is_datetime64_any_dtype(stamps)
+    texts = [] if dated else [*stamps.astype("str")]
+    return _date_axis(dates, names, texts, path), note
 
 
 def _time_columns(table: pandas.DataFrame, path: Path) -> list[str]:

@@ -33,7 +33,7 @@ class OverallUpdate:
 
 @dataclass
 class _Memory:
-    """What a later watch needs: the acknowledged time stamp, and what recipients know."""
+    """Memory for a later watch: the acknowledged time stamp, and what recipients know."""
 
     path: Path
     acknowledged: str | None = None
