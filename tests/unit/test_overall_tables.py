@@ -1,6 +1,7 @@
 """Tables of overall values as historians write them: marks, units, times, conditions, sensors."""
 
 import json
+from decimal import Decimal
 
 import numpy as np
 import pandas
@@ -44,6 +45,7 @@ def json_lines(path, row):
         (lambda n: f"{0.9 + 0.01 * n:.3f}".replace(".", ","), 1.89),
         (lambda n: f"{1.1 + 0.001 * n:.3f}", 1.199),
         (lambda n: f"{1e3 + 2 * n:.4e}", 1198.0),
+        (lambda n: f"{1e3 + 10 * n:.3e}".replace(".", ","), 1990.0),
     ],
 )
 def test_decimal_marks_and_thousands(text, last, tmp_path):
@@ -218,6 +220,7 @@ def test_parts_of_a_machine_are_no_conditions(tmp_path):
     ("heading", "first", "times"),
     [
         ("date,time", "2025-01-03,04:00", "2025-01-03T04:00:00"),
+        ("Datum,Uhrzeit", "13.01.25,04:00:30", "2025-01-13T04:00:30"),
         ("Datum,Uhrzeit", "13.01.2025,04:00:30", "2025-01-13T04:00:30"),
         ("time,date", "04:00,2025-01-03", "2025-01-03T04:00:00"),
         ("time", "20250103040000", "2025-01-03T04:00:00"),
@@ -235,8 +238,11 @@ def test_times(heading, first, times, tmp_path):
 
 def test_a_zone_of_parquet_is_shown_in_utc(tmp_path):
     times = pandas.date_range("2025-01-03 04:00", periods=3, freq="h", tz="Europe/Berlin")
-    pandas.DataFrame({"time": times, "rms": [1.0, 1.1, 1.2]}).to_parquet(tmp_path / "t.parquet")
-    assert read_overalls(tmp_path / "t.parquet").times[0] == "2025-01-03T03:00:00Z"
+    values = [Decimal("1.0"), Decimal("1.1"), Decimal("1.2")]
+    pandas.DataFrame({"time": times, "rms": values}).to_parquet(tmp_path / "t.parquet")
+    overalls = read_overalls(tmp_path / "t.parquet")
+    assert overalls.times[0] == "2025-01-03T03:00:00Z"
+    assert overalls.values["rms"].tolist() == [1.0, 1.1, 1.2]
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """Numbers as text: decimal points or commas, thousands separators, and entries without a number."""
 
 from collections.abc import Mapping
+from decimal import Decimal
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -14,8 +15,8 @@ MOSTLY = 0.5  # share of the entries that are numbers in a column of numbers
 LEAST_BESIDE_THOUSANDS = 100.0  # an integer without a mark from which 1,200 beside it is 1200
 _EXPONENT = r"(?:[eE][-+]?\d+)?"
 _GRAMMARS = {  # by decimal mark; thousands are separated by the other one
-    ".": rf"[-+]?(?:[1-9]\d{{0,2}}(?:,\d{{3}})+|\d+)?(?:\.\d*)?{_EXPONENT}",
-    ",": rf"[-+]?(?:[1-9]\d{{0,2}}(?:\.\d{{3}})+|\d+)?(?:,\d*)?{_EXPONENT}",
+    ".": rf"[-+]?(?:[1-9]\d{{0,2}}(?:,\d{{3}})+(?:\.\d*)?|\d*(?:\.\d*)?{_EXPONENT})",
+    ",": rf"[-+]?(?:[1-9]\d{{0,2}}(?:\.\d{{3}})+(?:,\d*)?|\d*(?:,\d*)?{_EXPONENT})",
 }
 _OTHER_MARK = {".": ",", ",": "."}
 _DIGIT = r"\d"
@@ -110,7 +111,9 @@ def _text_numbers(column: Column, mark: str) -> ColumnNumbers:
 
 def _as_float(entry: object) -> float:
     """Return a number of JSON; nan for anything else."""
-    if isinstance(entry, bool | np.bool_) or not isinstance(entry, int | float | np.number):
+    if isinstance(entry, bool | np.bool_) or not isinstance(
+        entry, int | float | np.number | Decimal
+    ):
         return np.nan
     try:
         return float(entry)

@@ -20,7 +20,7 @@ LARGEST_TICKS = 9.2e18  # nanoseconds since 1970 that a date can hold
 DATE_NAMES = ("date", "datum", "day", "tag")
 CALENDAR = {8: "%Y%m%d", 12: "%Y%m%d%H%M", 14: "%Y%m%d%H%M%S"}  # dates as a number, by digits
 _TIME_OF_DAY = r"\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?(?:\s?[AaPp][Mm])?"
-_DAY_OR_MONTH = r"\s*(\d{1,2})[./-](\d{1,2})[./-]\d{4}"
+_DAY_OR_MONTH = r"\s*(\d{1,2})[./-](\d{1,2})[./-](?:\d{4}|\d{2}(?:\s|$))"
 _ZONE = r":\d{2}.*(?:Z|UTC|GMT|[+-]\d{2}(?::?\d{2})?)$"
 
 
