@@ -6,7 +6,7 @@ import pytest
 
 from asperity.core.errors import BadInput
 from asperity.recording import check_recording, open_recording, read_recording
-from asperity.recording.sensitivity import parse_sensitivity
+from asperity.recording.sensitivity import parse_sensitivity, sensitivity_text
 
 RATE = 5000.0
 VOLTS = np.round(0.2 * np.random.default_rng(0).standard_normal(4000), 6)
@@ -130,3 +130,44 @@ def test_what_is_no_sensitivity_is_refused(tmp_path, text):
     (tmp_path / "recordings.toml").write_text(f'sensitivity = "{text}"')
     with pytest.raises(BadInput, match=r"recordings\.toml: a sensitivity must be positive"):
         read_recording(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "volts"),
+    [
+        ("1,000.0 mV/g", 1.0),
+        ("1.000,0 mV/g", 1.0),
+        ("1,000,000 uV/g", 1.0),
+        ("10,25 mV/g", 0.01025),
+        ("0,102 V/g", 0.102),
+        ("1000 mV/g", 1.0),
+        ("1.000 mV/g", 1e-3),
+    ],
+)
+def test_decimal_marks_and_thousands(text, volts):
+    assert parse_sensitivity(text).volts == pytest.approx(volts)
+
+
+def test_a_number_that_reads_in_two_ways_is_refused():
+    with pytest.raises(BadInput, match=r"may be 1\.000 or 1000 mV/g; write it"):
+        parse_sensitivity("1,000 mV/g")
+
+
+@pytest.mark.parametrize(
+    "attributes",
+    [
+        {"sensitivity_calibration_date": "2024-01-31", "sensitivity": "100 mV/g"},
+        {"Transverse sensitivity": "1.2 %", "Sensitivity": "100 mV/g"},
+        {"Sensitivity date": 20240131, "Sensitivity": 100, "Sensitivity Units": "mV/g"},
+        {"Sensitivity": np.array([100.0, 100.0]), "Sensitivity Units": "mV/g"},
+        {"Sensitivity": "[100.0, 100.0] mV/g"},
+        {"Charge sensitivity": "10 pC/g", "Sensitivity": b"100 mV/g"},
+    ],
+)
+def test_the_value_that_is_a_sensitivity_counts(attributes):
+    assert parse_sensitivity(sensitivity_text(attributes.items())).volts == pytest.approx(0.1)
+
+
+def test_several_values_are_listed():
+    stated = {"Sensitivity": [100.0, 99.0], "Sensitivity Units": "mV/g"}
+    assert sensitivity_text(stated.items()) == "100.0 mV/g; 99.0 mV/g"

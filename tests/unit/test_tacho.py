@@ -121,6 +121,37 @@ def test_pulses_of_no_shaft_are_refused():
         turning_by_times(100.0 + times_of(MARKS, "constant"), TIME.size, RATE)
 
 
+def test_every_third_pulse_missing_is_ambiguous():
+    marks = MARKS[np.arange(MARKS.size) % 3 != 2]
+    with pytest.raises(BadInput, match="because every third pulse is missing or of"):
+        turning_by_times(times_of(marks, "constant"), TIME.size, RATE)
+    turning = turning_by_times(times_of(marks, "constant"), TIME.size, RATE, per_turn=2.0)
+    assert turning.speed_hz == pytest.approx(25.0 / 3.0, rel=1e-2)  # two uneven marks, as stated
+
+
+@pytest.mark.parametrize("speed", SPEEDS)
+@pytest.mark.parametrize("lost", [5, 12])
+def test_a_long_gap_is_bridged(lost, speed):
+    marks = np.delete(MARKS, np.s_[100 : 100 + lost])
+    turning = turning_by_times(times_of(marks, speed), TIME.size, RATE)
+    known = np.isfinite(turning.turns)
+    assert np.ptp(turning.turns[known] - SPEEDS[speed][known]) < 0.05
+    assert "% of the tacho's pulses are missing and were bridged" in turning.remarks[0]
+
+
+def test_many_long_gaps_are_refused():
+    lost = [first + number for first in range(10, 190, 30) for number in range(6)]
+    with pytest.raises(BadInput, match="which no shaft produces"):
+        turning_by_times(times_of(np.delete(MARKS, lost), "constant"), TIME.size, RATE)
+
+
+def test_equal_times_are_left_out():
+    times_s = times_of(MARKS, "constant")
+    turning = turning_by_times(np.sort(np.append(times_s, times_s[20:23])), TIME.size, RATE)
+    assert turning.speed_hz == pytest.approx(25.0)
+    assert turning.remarks == ("the tacho has 3 equal times, which were left out",)
+
+
 def vibration():
     """Return noise with a 3 kHz resonance struck 3.58 times per turn of the rising speed."""
     rng = np.random.default_rng(1)

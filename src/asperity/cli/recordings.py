@@ -169,7 +169,7 @@ def track(
     """Track the contact resonance through recordings: stage of wear, alarm and forecast."""
     _require_outputs(out or (), page, store)
     if series is not None:
-        track_series(series, paths, page, out or (), acknowledge, as_json=as_json, quiet=quiet)
+        track_series(SimpleNamespace(**locals()))
         return
     read = recording.ReadOptions(rate_hz=rate, unit=unit, channel=channel, scale=scale)
     settings = _track_settings(

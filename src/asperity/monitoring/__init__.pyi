@@ -21,9 +21,9 @@ from .notify import notifiers as notifiers
 from .operating_point import ZERO_CELSIUS as ZERO_CELSIUS
 from .operating_point import OperatingPoint as OperatingPoint
 from .ordering import unacknowledged as unacknowledged
+from .overalls.formats import SERIES_SUFFIXES as SERIES_SUFFIXES
 from .overalls.judge import OverallTrack as OverallTrack
 from .overalls.judge import track_overalls as track_overalls
-from .overalls.table import SERIES_SUFFIXES as SERIES_SUFFIXES
 from .overalls.table import OverallValues as OverallValues
 from .overalls.table import read_overalls as read_overalls
 from .overalls.watch import OverallUpdate as OverallUpdate

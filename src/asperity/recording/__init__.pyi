@@ -17,5 +17,7 @@ from .sidecar import is_sidecar as is_sidecar
 from .sidecar import read_sidecar as read_sidecar
 from .sidecar import sidecar_names as sidecar_names
 from .timing import is_time_column as is_time_column
+from .units import acceleration_scale as acceleration_scale
 from .units import name_and_unit as name_and_unit
 from .units import time_scale as time_scale
+from .units import velocity_scale as velocity_scale

@@ -16,10 +16,13 @@ FIRST_INTERVALS = 15  # whose median is the first expected interval
 LOCAL_INTERVALS = 5  # whose median is the next one, as the speed varies
 TOLERANCE = 0.25  # of the local interval, within which a pulse is in its place
 MAX_MISSING = 3  # pulses in a row that are bridged
+MAX_GAP = 20  # pulses in a row that a long gap may lack
+MAX_LONG_GAPS = 3  # of more than MAX_MISSING pulses
 MAX_IRREGULAR = 0.2  # of the intervals that may have a wrong pulse
 ALTERNATION = 0.1  # ln ratio of successive intervals above which they belong to pairs of pulses
 REMARKED_ALTERNATION = 0.02  # above which it is remarked; half orders of a shaft cause less
 ALTERNATING_SHARE = 0.9  # of the intervals that alternate, and by about the same ratio
+THIRD_MISSING = (0.31, 0.36)  # of a pair of intervals, of two marks or of a pulse that is missing
 SHORT_SHARE = 0.25  # of a pair of intervals: below it a pulse is doubled, not a second mark
 
 
@@ -83,6 +86,8 @@ def are_times(values: Field) -> bool:
 
 
 def _turning(edges: Field, samples: int, rate_hz: float, per_turn: float) -> Turning:
+    repeated, edges = edges.size, np.unique(edges)
+    repeated -= edges.size
     if edges.size < MIN_PULSES:
         raise BadInput(
             f"the tacho signal has {edges.size} pulses, but {MIN_PULSES} are required; use "
@@ -93,9 +98,10 @@ def _turning(edges: Field, samples: int, rate_hz: float, per_turn: float) -> Tur
     turns = pairs.counts * counted.counts / per_turn
     angle = scipy.interpolate.PchipInterpolator(counted.edges, turns, extrapolate=False)
     duration_s = (counted.edges[-1] - counted.edges[0]) / rate_hz
-    return Turning(
-        angle(np.arange(samples)), float(turns[-1] / duration_s), pairs.remarks + counted.remarks
-    )
+    remarks = pairs.remarks + counted.remarks
+    if repeated:
+        remarks = (f"the tacho has {repeated} equal times, which were left out", *remarks)
+    return Turning(angle(np.arange(samples)), float(turns[-1] / duration_s), remarks)
 
 
 def _without_pairs(edges: Field, per_turn: float) -> _Pulses:
@@ -103,6 +109,11 @@ def _without_pairs(edges: Field, per_turn: float) -> _Pulses:
 
     `counts` is the number of stated pulses for each of them: 1 where every pulse is doubled, 2
     where an even number of marks is unevenly spaced.
+
+    Raises
+    ------
+    BadInput
+        for intervals of 1 to 2 without two stated marks, which a missing pulse produces too.
     """
     single = np.ones(1)
     intervals = np.log(np.diff(edges))
@@ -117,19 +128,33 @@ def _without_pairs(edges: Field, per_turn: float) -> _Pulses:
     short = 1.0 / (1.0 + np.exp(alternation))
     even = per_turn % 2.0 == 0.0
     if alternation < ALTERNATION:
-        remark = (
-            f"the tacho's intervals alternate by {100.0 * alternation:.2g} %; state "
-            f"pulses_per_turn = {2.0 * per_turn:g} if it has twice as many marks"
-        )
-        return _Pulses(edges, single, () if even else (remark,))
+        return _Pulses(edges, single, () if even else (_alternation_remark(alternation, per_turn),))
     first = np.concatenate([[True], excess > -0.5 * alternation])  # after a long interval
     if even and short >= SHORT_SHARE:
         return _Pulses(edges[first], 2.0 * single, ())
+    _require_pairs(short, per_turn)
     remark = (
         f"the tacho has two pulses in place of one, at {short:.2g} and {1.0 - short:.2g} of its "
         "interval; every second one is used"
     )
     return _Pulses(edges[first], single, (remark,))
+
+
+def _alternation_remark(alternation: float, per_turn: float) -> str:
+    return (
+        f"the tacho's intervals alternate by {100.0 * alternation:.2g} %; state "
+        f"pulses_per_turn = {2.0 * per_turn:g} if it has twice as many marks"
+    )
+
+
+def _require_pairs(short: float, per_turn: float) -> None:
+    """Raise BadInput for a short interval that a missing pulse causes as well as a second mark."""
+    if THIRD_MISSING[0] < short < THIRD_MISSING[1]:
+        raise BadInput(
+            f"the tacho's intervals alternate as {short:.2g} to {1.0 - short:.2g}, because every "
+            f"third pulse is missing or of two marks; state pulses_per_turn = {2.0 * per_turn:g} "
+            "for two marks, or use another channel"
+        )
 
 
 def _in_place(edges: Field, per_turn: float) -> _Pulses:
@@ -168,17 +193,20 @@ def _scan(edges: Field) -> _Scan:
     doubled: list[int] = []
     missing: list[int] = []
     regular = [float(np.median(np.diff(edges)[:FIRST_INTERVALS]))]
-    irregular = 0
+    irregular = long_gaps = 0
     for edge in range(1, edges.size):
         usual = float(np.median(regular[-LOCAL_INTERVALS:]))
         interval = float(edges[edge] - edges[kept[-1]])
-        following = float(edges[min(edge + 1, edges.size - 1)] - edges[kept[-1]])
         ratio = interval / usual
-        if ratio < 1.0 - TOLERANCE / 2.0 and _is_better(following / usual, ratio):
+        if _is_doubled(edges, edge, kept[-1], usual):
             doubled.append(edge)
             continue
+        most = MAX_MISSING
+        if round(ratio) > 1 + MAX_MISSING and long_gaps < MAX_LONG_GAPS:
+            ratio, most = interval / _interval_in_gap(edges, edge, usual), MAX_GAP
+            long_gaps += 1
         number = max(round(ratio), 1)
-        if number > 1 + MAX_MISSING or abs(ratio - number) > TOLERANCE:
+        if number > 1 + most or abs(ratio - number) > TOLERANCE:
             irregular, number = irregular + 1, 1
         if number > 1:
             missing.append(edge)
@@ -188,9 +216,19 @@ def _scan(edges: Field) -> _Scan:
     return _Scan(kept, counts, doubled, missing, irregular)
 
 
-def _is_better(following: float, ratio: float) -> bool:
-    """Return whether the following pulse is in its place, and closer to it than this one."""
-    return abs(following - 1.0) < min(1.0 - ratio, TOLERANCE)
+def _interval_in_gap(edges: Field, edge: int, before: float) -> float:
+    """Return the pulse interval at the mean of the speeds before and after a long gap."""
+    later = np.diff(edges[edge : edge + LOCAL_INTERVALS + 1])
+    after = float(np.median(later)) if later.size else before
+    return 2.0 / (1.0 / before + 1.0 / after)
+
+
+def _is_doubled(edges: Field, edge: int, last: int, usual: float) -> bool:
+    """Return whether a pulse is early, and the following one in its place and closer to it."""
+    ratio = float(edges[edge] - edges[last]) / usual
+    following = float(edges[min(edge + 1, edges.size - 1)] - edges[last]) / usual
+    early = ratio < 1.0 - TOLERANCE / 2.0
+    return early and abs(following - 1.0) < min(1.0 - ratio, TOLERANCE)
 
 
 def _once_per_turn(places: list[int], per_turn: float) -> bool:

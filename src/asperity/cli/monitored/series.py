@@ -1,15 +1,15 @@
 """`asperity track --series`: a table of time stamps and overall values; exit codes of states."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from pathlib import Path
+from os import environ
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import typer
 
-from asperity import monitoring
+from asperity import monitoring, trend
 from asperity.cli.output import Block, columns, show, table, written
 from asperity.core.errors import BadInput
 from asperity.core.quantities import NO_VALUE
@@ -20,6 +20,38 @@ if TYPE_CHECKING:
 
 EXIT_CODES = {"alarm": 3, "cannot-tell": 4, "blind": 5}  # by state of the alarm; otherwise 0
 LAST_ROWS = 10  # that are shown
+# options that only recordings use, with the name and default of each
+WITHOUT_RECORDINGS: dict[str, tuple[str, object]] = {
+    "--rate": ("rate", None),
+    "--unit": ("unit", None),
+    "--channel": ("channel", None),
+    "--scale": ("scale", None),
+    "--case": ("case_file", None),
+    "--band": ("band", None),
+    "--table": ("table_file", None),
+    "--shaft": ("shaft", None),
+    "--method": ("method", None),
+    "--stages-from": ("stages_from", "crf"),
+    "--false-alarms": ("false_alarms", trend.FALSE_ALARM_RATE),
+    "--forecast": ("forecast", None),
+    "--worn": ("worn", None),
+    "--emulator": ("emulator", None),
+    "--store": ("store", None),
+    "--workers": ("workers", None),
+}
+ONLY_OF_WATCH: dict[str, tuple[str, object]] = {
+    "--machine": ("machine", None),
+    "--point": ("point", None),
+    "--sensor": ("sensor", None),
+}
+ONLY_OF_FOLDERS: dict[str, tuple[str, object]] = {
+    "--tree": ("tree", False),
+    "--expect": ("expect", None),
+    "--report-every": ("report_every", None),
+    "--keep": ("keep", None),
+    "--line-protocol": ("line_protocol", None),
+    "--prometheus": ("prometheus", None),
+}
 
 
 def end_with(state: str) -> None:
@@ -28,45 +60,36 @@ def end_with(state: str) -> None:
         raise typer.Exit(EXIT_CODES[state])
 
 
-def track_series(
-    series: Path,
-    paths: list[Path] | None,
-    page: Path | None,
-    out: Sequence[Path],
-    acknowledge: str | None,
-    *,
-    as_json: bool,
-    quiet: bool,
-) -> None:
+def track_series(options: SimpleNamespace) -> None:
     """Judge a table of overall values and end with the exit code of its state."""
-    if paths or page is not None:
-        extra = "recordings" if paths else "--report"
+    if options.paths or options.page is not None:
+        extra = "recordings" if options.paths else "--report"
         raise BadInput(f"--series judges a table by itself, got {extra} too; leave one out")
-    judged = monitoring.track_overalls(series, acknowledge=acknowledge)
-    saved = [judged.save(path) for path in out]
+    _refuse_others(options, WITHOUT_RECORDINGS | ONLY_OF_WATCH)
+    judged = monitoring.track_overalls(options.series, acknowledge=options.acknowledge)
+    saved = [judged.save(path) for path in options.out or ()]
     show(
         judged.verdict(),
         lambda: judged.scalars() | {"written": [str(path) for path in saved]},
         _overall_rows(judged),
         written("  Written", *saved) if saved else ["  Add --out judged.csv for all rows."],
-        as_json=as_json,
-        quiet=quiet,
+        as_json=options.as_json,
+        quiet=options.quiet,
     )
     end_with(judged.state)
 
 
+def _refuse_others(options: SimpleNamespace, unused: Mapping[str, tuple[str, object]]) -> None:
+    """Raise BadInput for an option that overall values do not use and that is not its default."""
+    for option, (name, default) in unused.items():
+        value = getattr(options, name, default)
+        if value not in (default, []) and value != environ.get(f"ASPERITY_{name.upper()}"):
+            raise BadInput(f"{option} does not apply to a table of overall values; leave it out")
+
+
 def watch_series(options: SimpleNamespace, notify_states: "Sequence[AlarmState]") -> None:
     """Judge a table of overall values at each change, and end with the code of its last state."""
-    unused = {
-        "--table": options.table_file,
-        "--case": options.case_file,
-        "--forecast": options.forecast,
-        "--store": options.store,
-        "--keep": options.keep,
-    }
-    for name, value in unused.items():
-        if value is not None:
-            raise BadInput(f"{name} does not apply to a table of overall values; leave it out")
+    _refuse_others(options, WITHOUT_RECORDINGS | ONLY_OF_FOLDERS)
     watching = monitoring.WatchSettings(
         machine=options.machine,
         point=options.point,
@@ -109,7 +132,7 @@ def _show_overall_update(update: "OverallUpdate", options: SimpleNamespace) -> s
 
 def _overall_rows(judged: "OverallTrack") -> Block:
     """Yield the last rows of a judged table, and its notes."""
-    overalls, rows = judged.overalls, judged.rows()[-LAST_ROWS:]
+    overalls, rows = judged.overalls, judged.rows(LAST_ROWS)
     titles = ["time" if overalls.times else overalls.x_unit or "x"]
     titles += [
         f"{name} [{overalls.units[name]}]" if overalls.units[name] else name
@@ -129,4 +152,4 @@ def _overall_rows(judged: "OverallTrack") -> Block:
     if len(rows) < len(judged.states):
         yield f"  the last {len(rows)} of {len(judged.states)} rows"
     yield from columns([*titles, "state"], numbers, left=1)
-    yield from table([("level", judged.level.reason)], overalls.notes)
+    yield from table([("level", judged.level.reason)], judged.notes)

@@ -8,27 +8,31 @@ from typing import NamedTuple
 import numpy as np
 import pandas
 
-from asperity.core.arrays import finite_or_none
+from asperity.core.arrays import Field, finite_or_none
 from asperity.core.documents import JsonObject
 from asperity.core.errors import BadInput
 from asperity.core.files import write_csv
-from asperity.monitoring.alarm import LAST, LEVEL_LEAST, ratio_text
+from asperity.monitoring.alarm import LEVEL_LEAST, ratio_text
 from asperity.monitoring.operating_point import LEVEL, USUAL_OIL, OperatingPoint, conditions_of
+from asperity.monitoring.overalls.acknowledged import acknowledged_rows, row_name
+from asperity.monitoring.overalls.columns import is_logarithmic
+from asperity.monitoring.overalls.row_levels import RowLevels
+from asperity.monitoring.overalls.sensors import blind_sensors
 from asperity.monitoring.overalls.table import OverallValues, read_overalls
+from asperity.monitoring.overalls.zones import lasting_zone, velocity_zones
 from asperity.monitoring.states import ZONE
-from asperity.rating import severity_zone
-from asperity.trend import AlarmState, LevelJudgement, LevelMonitors, MonitoredSeries
+from asperity.trend import AlarmState, LevelJudgement, MonitoredSeries
 
-METRES_PER_SECOND = {"m/s": 1.0, "mm/s": 1e-3, "in/s": 0.0254, "ips": 0.0254}
-STUCK = 30  # last equal rows from which a sensor that varied before counts as blind
 NO_SPECTRUM = "overall values have no spectrum"
+DECIBEL = np.log(10.0) / 20.0  # of an amplitude
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OverallTrack:
     """Judged overall values: the state after each row, and how the last one came about.
 
-    `since` is the row with which the present state began, None for "none".
+    `since` is the row with which the present state began, None for "none". `acknowledged` counts
+    the acknowledged rows. `blind` is the reason for which a sensor is blind, "" without one.
     """
 
     overalls: OverallValues
@@ -38,6 +42,8 @@ class OverallTrack:
     reason: str
     level: LevelJudgement
     blind: str
+    acknowledged: int = 0
+    notes: tuple[str, ...] = ()
 
     @property
     def state(self) -> AlarmState:
@@ -53,9 +59,10 @@ class OverallTrack:
 
     def verdict(self) -> str:
         """Return state and reason in one sentence."""
+        since = row_name(self.overalls, self.since or 0)
         start = {
-            "alarm": f"ALARM since {self._place(self.since or 0)}",
-            "alert": f"Alert since {self._place(self.since or 0)}",
+            "alarm": f"ALARM since {since}",
+            "alert": f"Alert since {since}",
             "blind": "Blind",
             "cannot-tell": "Cannot tell",
             "none": "No alarm",
@@ -65,11 +72,19 @@ class OverallTrack:
     @property
     def last_place(self) -> str:
         """Time stamp or x of the last row, as text."""
-        return self._place(len(self.states) - 1)
+        return row_name(self.overalls, len(self.states) - 1)
+
+    @property
+    def acknowledged_place(self) -> str | None:
+        """Time stamp or exact x of the last acknowledged row, as text; None without one."""
+        if not self.acknowledged:
+            return None
+        number, overalls = self.acknowledged - 1, self.overalls
+        return overalls.times[number] if overalls.times else repr(float(overalls.x[number]))
 
     def scalars(self, *, rows: bool = True) -> JsonObject:
         """Return the JSON of `asperity track --series`, if requested with all rows."""
-        since = None if self.since is None else self._place(self.since)
+        since = None if self.since is None else row_name(self.overalls, self.since)
         alarm = {"state": self.state, "since": since, "reason": self.reason}
         leveled = self.state in ("alert", "alarm")
         return {
@@ -86,27 +101,26 @@ class OverallTrack:
             "sensor": {"state": "blind" if self.blind else "ok", "reason": self.blind},
             "units": dict(self.overalls.units),
             "x": f"x_{self.overalls.x_unit}" if self.overalls.x_unit else "x",
-            "notes": list(self.overalls.notes),
+            "notes": list(self.notes),
         }
 
-    def rows(self) -> list[JsonObject]:
-        """Return one row per time stamp: x, time, values, conditions, state."""
-        overalls = self.overalls
-        columns = {**overalls.values, **overalls.conditions}
+    def rows(self, latest: int | None = None) -> list[JsonObject]:
+        """Return one row per time stamp, of all or the latest: x, time, values, state."""
+        first = 0 if latest is None else max(len(self.states) - latest, 0)
+        columns = self._columns()
         return [
             {
-                "x": finite_or_none(float(x)),
-                "time": overalls.times[number] if overalls.times else None,
-                **{name: finite_or_none(float(values[number])) for name, values in columns.items()},
-                "state": self.states[number],
+                name: finite_or_none(float(entry)) if name in numeric else entry
+                for name, entry in zip(columns, row, strict=True)
             }
-            for number, x in enumerate(overalls.x)
+            for numeric in [{*columns} - {"time", "state"}]
+            for row in zip(*(entries[first:] for entries in columns.values()), strict=True)
         ]
 
     @property
     def table(self) -> pandas.DataFrame:
         """One row per time stamp."""
-        return pandas.DataFrame(self.rows())
+        return pandas.DataFrame(self._columns())
 
     def save(self, path: str | Path) -> Path:
         """Write the table as .csv.
@@ -122,12 +136,16 @@ class OverallTrack:
         write_csv(path, self.table)
         return path
 
-    def _place(self, number: int) -> str:
-        """Return time stamp or x of a row, as text."""
+    def _columns(self) -> dict[str, Field | Sequence[str] | Sequence[None]]:
+        """Return x, times, values, conditions and states by name."""
         overalls = self.overalls
-        if overalls.times:
-            return overalls.times[number]
-        return f"{overalls.x[number]:g} {overalls.x_unit}".rstrip()
+        return {
+            "x": overalls.x,
+            "time": overalls.times or [None] * len(self.states),
+            **overalls.values,
+            **overalls.conditions,
+            "state": self.states,
+        }
 
 
 def track_overalls(path: str | Path, *, acknowledge: str | None = None) -> OverallTrack:
@@ -136,8 +154,8 @@ def track_overalls(path: str | Path, *, acknowledge: str | None = None) -> Overa
     Parameters
     ----------
     path : as `read_overalls`
-    acknowledge : time stamp up to which alarms are acknowledged, as in the file or in ISO 8601;
-        "last": all rows. The baseline restarts after it
+    acknowledge : time stamp up to which alarms are acknowledged, as in the file or in ISO 8601, or
+        a date; "last": all rows. The baseline restarts after it
 
     Raises
     ------
@@ -145,20 +163,32 @@ def track_overalls(path: str | Path, *, acknowledge: str | None = None) -> Overa
         for a table that cannot be read, or an unknown time stamp.
     """
     overalls = read_overalls(path)
-    first = _acknowledged(overalls, acknowledge)
-    levels = LevelMonitors(_monitored(overalls), overalls.x.size, first)
-    zones = _zones(overalls)
+    return judge_overalls(overalls, acknowledged_rows(overalls, acknowledge))
+
+
+def judge_overalls(overalls: OverallValues, first: int) -> OverallTrack:
+    """Judge overall values from a row on; those before it are acknowledged."""
+    levels = RowLevels(_monitored(overalls), overalls.x.size, first)
+    zones, notes = velocity_zones(overalls)
     states: list[AlarmState] = ["none"] * first
     decision = _Decision("none", "all rows are acknowledged")
     for number in range(first, overalls.x.size):
         levels.add(number)
         if decision.state != "alarm":  # latched
-            decision = _decide(levels, _lasting_zone(zones, number, first))
-        states.append(decision.state)
-    blind = _blind(overalls)
-    if blind and decision.state != "alarm":
-        decision = _Decision("blind", blind)
+            zone = lasting_zone(zones, number, first) if zones else ("", "")
+            state = _state(levels, zone[0])
+            if state == "alarm" or number == overalls.x.size - 1:
+                decision = _decide(levels, zone)
+            states.append(state)
+        else:
+            states.append("alarm")
+    blind = blind_sensors(overalls)
+    reason = "; ".join(blind.values())
+    if len(blind) == len(overalls.values) and decision.state != "alarm":
+        decision = _Decision("blind", reason)
         states[-1] = "blind"
+    elif blind:
+        notes.append(f"Blind: {reason}; the alarm is that of the others.")
     return OverallTrack(
         overalls=overalls,
         states=tuple(states),
@@ -166,7 +196,9 @@ def track_overalls(path: str | Path, *, acknowledge: str | None = None) -> Overa
         raised_by=decision.raised_by,
         reason=decision.reason,
         level=levels.judgement(),
-        blind=blind,
+        blind=reason,
+        acknowledged=first,
+        notes=(*overalls.notes, *_unmeasured(overalls), *notes),
     )
 
 
@@ -178,17 +210,23 @@ class _Decision(NamedTuple):
     raised_by: str = ""
 
 
-def _decide(levels: LevelMonitors, zone: tuple[str, str]) -> _Decision:
-    """Decide the state after a row from the levels and the lasting zone."""
-    level = levels.judgement()
-    letter, reason = zone
-    if letter == "D" and level.state != "alarm":
-        return _Decision("alarm", reason, ZONE)
-    if letter == "C" and level.state == "none":
-        return _Decision("alert", reason, ZONE)
-    if level.state == "none" and not levels.complete:
-        return _Decision("cannot-tell", "baseline incomplete: fewer than 8 rows with values")
-    return _Decision(level.state, level.reason, "" if level.state == "none" else level.name)
+def _state(levels: RowLevels, letter: str) -> AlarmState:
+    """Return the state after a row from the levels and the lasting zone."""
+    if letter == "D" or levels.state == "alarm":
+        return "alarm"
+    if letter == "C" or levels.state == "alert":
+        return "alert"
+    return "none" if levels.complete else "cannot-tell"
+
+
+def _decide(levels: RowLevels, zone: tuple[str, str]) -> _Decision:
+    """Return the state after a row with its reason."""
+    level, state = levels.judgement(), _state(levels, zone[0])
+    if state == "cannot-tell":
+        return _Decision(state, "baseline incomplete: fewer than 8 rows with values")
+    if state != levels.state:
+        return _Decision(state, zone[1], ZONE)
+    return _Decision(state, level.reason, "" if state == "none" else level.name)
 
 
 def _since(states: Sequence[AlarmState]) -> int | None:
@@ -216,78 +254,37 @@ def _monitored(overalls: OverallValues) -> list[MonitoredSeries]:
         else []
     )
     conditions = conditions_of(points, LEVEL, USUAL_OIL) if points else ()
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return [
-            MonitoredSeries(
-                name=name,
-                values=np.where(values > 0.0, np.log(values), np.nan),
-                smallest_change=LEVEL_LEAST,
-                contact=False,
-                describe=ratio_text,
-                conditions=conditions,
-            )
-            for name, values in overalls.values.items()
-        ]
-
-
-def _zones(overalls: OverallValues) -> dict[str, tuple[str, ...]]:
-    """Return the zone of ISO 20816-3 after each row, "" if unknown, for each velocity."""
-    if overalls.machine_class is None:
-        return {}
-    zones = {}
-    for name, values in overalls.values.items():
-        scale = METRES_PER_SECOND.get(overalls.units[name].lower())
-        if scale is not None and "peak" not in name.lower():
-            zones[name] = tuple(
-                severity_zone(scale * value, overalls.machine_class) if np.isfinite(value) else ""
-                for value in values
-            )
-    return zones
-
-
-def _lasting_zone(zones: dict[str, tuple[str, ...]], number: int, first: int) -> tuple[str, str]:
-    """Return the better of the last two zones of the worst velocity, and the reason in words."""
-    if number <= first or not zones:
-        return "", ""
-    lasting = {name: min(of[number - 1], of[number]) for name, of in zones.items()}
-    name = max(lasting, key=lambda name: lasting[name])
-    return lasting[name], f"{name} is in zone {lasting[name]} of ISO 20816-3"
-
-
-def _blind(overalls: OverallValues) -> str:
-    """Return why the last rows show nothing of the machine, or ""."""
-    latest = {name: values[-1] for name, values in overalls.values.items()}
-    if not any(np.isfinite(value) and value > 0.0 for value in latest.values()):
-        return "the last row has no value above 0"
-    if overalls.x.size <= 2 * STUCK:
-        return ""
-    stuck = [
-        name
-        for name, values in overalls.values.items()
-        if np.ptp(values[-STUCK:]) == 0.0 and _varies(values[:-STUCK])
-    ]
-    if len(stuck) < len(latest):
-        return ""
-    return f"{', '.join(stuck)} has not changed in the last {STUCK} rows"
-
-
-def _varies(values: Sequence[float] | np.ndarray) -> bool:
-    """Return whether at most half of the successive values are equal."""
-    return bool(np.mean(np.diff(values) == 0.0) < 0.5)
-
-
-def _acknowledged(overalls: OverallValues, time: str | None) -> int:
-    """Return the number of acknowledged rows."""
-    if time is None:
-        return 0
-    if time == LAST:
-        return int(overalls.x.size)
-    stamp = time.strip().replace(" ", "T")
-    places = overalls.times or [f"{x:g}" for x in overalls.x]
-    numbers = [number for number, place in enumerate(places, 1) if place == stamp]
-    if not numbers:
-        raise BadInput(
-            f"{time} is not a time stamp of {overalls.path.name}; acknowledge one of them, such as "
-            f"{places[-1]}, or {LAST!r} for the newest"
+    return [
+        MonitoredSeries(
+            name=name,
+            values=_logarithms(values, overalls.units[name]),
+            smallest_change=LEVEL_LEAST,
+            contact=False,
+            describe=ratio_text,
+            conditions=conditions,
         )
-    return numbers[-1]
+        for name, values in overalls.values.items()
+    ]
+
+
+def _logarithms(values: Field, unit: str) -> Field:
+    """Return the natural logarithms of amplitudes, or of the amplitudes of decibels."""
+    if is_logarithmic(unit):
+        return np.where(np.isfinite(values), DECIBEL * values, np.nan)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where((values > 0.0) & np.isfinite(values), np.log(values), np.nan)
+
+
+def _unmeasured(overalls: OverallValues) -> list[str]:
+    """Return a note on each column with numbers that have no level."""
+    notes = []
+    for name, values in overalls.values.items():
+        counts = {"infinite": int(np.isinf(values).sum())}
+        if not is_logarithmic(overalls.units[name]):
+            counts["0 or below"] = int((values[np.isfinite(values)] <= 0.0).sum())
+        notes += [
+            f"{name} is {kind} in {count} row{'s' * (count > 1)} without a level."
+            for kind, count in counts.items()
+            if count
+        ]
+    return notes

@@ -14,9 +14,10 @@ from asperity.core.documents import JsonObject
 from asperity.core.errors import AsperityError
 from asperity.core.files import make_folder, write_text
 from asperity.core.troubles import RetryDelay, Troubles, failure_reason
-from asperity.monitoring.alarm import LAST
 from asperity.monitoring.notify import COMMAND_S, NETWORK_S, RETRY_S, within
-from asperity.monitoring.overalls.judge import OverallTrack, track_overalls
+from asperity.monitoring.overalls.acknowledged import rows_until
+from asperity.monitoring.overalls.judge import OverallTrack, judge_overalls, track_overalls
+from asperity.monitoring.overalls.table import read_overalls
 from asperity.monitoring.settings import Notifier, WatchSettings
 
 DEFAULTS = WatchSettings()
@@ -32,7 +33,7 @@ class OverallUpdate:
 
 @dataclass
 class _Memory:
-    """Stored state of a watch: the acknowledged time stamp and the notified states."""
+    """Memory for a later watch: the acknowledged time stamp, and what recipients know."""
 
     path: Path
     acknowledged: str | None = None
@@ -43,7 +44,12 @@ class _Memory:
         """Return the stored memory; empty if there is none, or it is damaged."""
         try:
             stored = json.loads(path.read_text("utf-8"))
-            return cls(path, stored["acknowledged"], dict(stored["known"]))
+            stamp = stored["acknowledged"]
+            known = {
+                str(name): {"state": of["state"], "causes": [*of["causes"]]}
+                for name, of in dict(stored["known"]).items()
+            }
+            return cls(path, None if stamp is None else str(stamp), known)
         except (OSError, ValueError, KeyError, TypeError):
             return cls(path)
 
@@ -99,9 +105,11 @@ class _Watch:
         self.memory = _Memory.load(out / f"{path.name}.json")
         self.troubles, self.retry = Troubles(), RetryDelay(RETRY_S)
         self.version = _version(path)
-        self.track = track_overalls(path, acknowledge=acknowledge or self.memory.acknowledged)
-        if acknowledge is not None:
-            self.memory.acknowledged = self.track.last_place if acknowledge == LAST else acknowledge
+        if acknowledge is None:
+            self.track = self._judged()
+        else:
+            self.track = track_overalls(path, acknowledge=acknowledge)
+            self.memory.acknowledged = self.track.acknowledged_place
         self.changed = True
 
     def read(self) -> None:
@@ -111,13 +119,18 @@ class _Watch:
         if version == self.version or 0.0 <= age < self.watching.settle_time_s:
             return
         try:
-            self.track = track_overalls(self.path, acknowledge=self.memory.acknowledged)
+            self.track = self._judged()
         except AsperityError as error:
             reason = failure_reason(error)
             self.troubles.begin("table", f"{reason}; the last evaluation stands, retrying")
             return
         self.troubles.end("table", f"{self.path.name} can be read again")
         self.version, self.changed = version, True
+
+    def _judged(self) -> OverallTrack:
+        """Judge the table after the acknowledged row, which may have left it."""
+        overalls = read_overalls(self.path)
+        return judge_overalls(overalls, rows_until(overalls, self.memory.acknowledged))
 
     def update(self) -> OverallUpdate | None:
         """Store the memory and return what is new; None if nothing is."""
