@@ -198,5 +198,5 @@ def test_rows_are_judged_as_by_all_monitors_with_reasons():
         monitors.add(number)
         states.add(rows.state)
         assert (rows.state, rows.complete) == (monitors.judgement().state, monitors.complete)
-    assert states == {"none", "alert"}
+    assert states >= {"none", "alert"}
     assert rows.judgement() == monitors.judgement()
