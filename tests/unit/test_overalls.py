@@ -8,6 +8,8 @@ import pytest
 
 from asperity.core.errors import BadInput, UnreadableFile
 from asperity.monitoring import read_overalls, track_overalls
+from asperity.monitoring.overalls.row_levels import RowLevels
+from asperity.trend import LevelMonitors, MonitoredSeries
 
 COUNT = 300
 
@@ -180,3 +182,23 @@ def test_few_rows_cannot_be_judged(tmp_path):
     judged = track_overalls(path)
     assert judged.state == "cannot-tell"
     assert judged.verdict().startswith("Cannot tell: baseline incomplete")
+
+
+def test_rows_are_judged_as_by_all_monitors_with_reasons():
+    rng = np.random.default_rng(7)
+    values = {name: 0.3 * rng.standard_normal(COUNT) for name in "ab"}
+    values["a"][200:240] += 1.1
+    values["b"][rng.random(COUNT) < 0.3] = np.nan
+    monitored = [
+        MonitoredSeries(name=name, values=series, smallest_change=0.7, contact=False, describe=str)
+        for name, series in values.items()
+    ]
+    rows, monitors = RowLevels(monitored, COUNT, 0), LevelMonitors(monitored, COUNT, 0)
+    states = set()
+    for number in range(COUNT):
+        rows.add(number)
+        monitors.add(number)
+        states.add(rows.state)
+        assert (rows.state, rows.complete) == (monitors.judgement().state, monitors.complete)
+    assert states >= {"none", "alert"}
+    assert rows.judgement() == monitors.judgement()
