@@ -45,6 +45,9 @@ THRESHOLDS = (
 )
 
 
+LOWEST_HEIGHT = math.log(ALERT_FACTOR)  # of a threshold over the reference
+
+
 class LevelFinding(NamedTuple):
     """State of a level after a recording, and the evidence in words."""
 
@@ -83,7 +86,9 @@ class LevelMonitor:
             return self.finding
         self._add_to_baseline(level)
         rise = level - self.reference
-        passed = sum(rise >= self._height(limit) for limit in THRESHOLDS)
+        passed = 0
+        if rise >= LOWEST_HEIGHT:
+            passed = sum(rise >= self._height(limit) for limit in THRESHOLDS)
         self.latest.append((level, passed if self.complete else 0))
         if len(self.latest) > LATEST:
             _, oldest = self.latest.pop(0)
@@ -181,6 +186,8 @@ class LevelMonitor:
         return min(max(height, ALERT_DEVIATIONS * scatter), math.log(ALARM_FACTOR))
 
     def _judged(self) -> LevelFinding:
+        if self.finding.state == "none" and not any(passed for _, passed in self.latest):
+            return NO_FINDING
         for number, limit in enumerate(THRESHOLDS):
             evidence = self._evidence(number, limit)
             if evidence:
