@@ -17,7 +17,7 @@ import numpy as np
 from scipy.stats import norm
 
 from asperity.trend import FALSE_ALARM_RATE
-from asperity.trend.alarm import CONTACT_SHARE
+from asperity.trend.decision import CONTACT_SHARE
 from asperity.trend.sequential import LONGEST_CYCLE, SHORTEST_CYCLE
 from benchmarks.alarms import AFTER, RECORDINGS, RISE_HZ
 

@@ -62,7 +62,7 @@ def test_dropped_recordings_show_their_resonance_or_a_reason(browser, tmp_path, 
         box.press("Enter")
         page.get_by_role("button", name="Read again").click()
         page.get_by_text("1 recordings read").wait_for()
-        page.get_by_text("Cannot tell: no contact").wait_for()
+        page.get_by_text("No contact resonance found").wait_for()
         page.locator("input[type=file]").set_input_files(sorted(rig.glob("*.h5")))
         page.get_by_text("8 recordings read").wait_for()
         page.get_by_text(re.compile("contact resonance found in 7 of 8 recordings")).wait_for()

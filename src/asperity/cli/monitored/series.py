@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from asperity import monitoring, trend
+from asperity import monitoring
 from asperity.cli.output import Block, columns, show, table, written
 from asperity.core.errors import BadInput
 from asperity.core.quantities import NO_VALUE
@@ -32,7 +32,7 @@ WITHOUT_RECORDINGS: dict[str, tuple[str, object]] = {
     "--shaft": ("shaft", None),
     "--method": ("method", None),
     "--stages-from": ("stages_from", "crf"),
-    "--false-alarms": ("false_alarms", trend.FALSE_ALARM_RATE),
+    "--false-alarms": ("false_alarms", 1e-3),
     "--forecast": ("forecast", None),
     "--worn": ("worn", None),
     "--emulator": ("emulator", None),
