@@ -137,5 +137,5 @@ def test_bursts_of_lost_samples_add_neither_lines_nor_a_slope(tmp_path):
     assert np.mean(densities[1]) == pytest.approx(np.mean(densities[0]), rel=0.15)
     assert np.max(densities[1]) < 2.0 * np.mean(densities[0])
     assert any(
-        "4 % of the time: lost samples? Left out" in remark for remark in reading.quality.remarks
+        "4 % of the time: lost samples? Excluded" in remark for remark in reading.quality.remarks
     )
