@@ -101,7 +101,7 @@ def test_an_alarm_is_notified_while_the_store_cannot_be_written(tmp_path, disk):
     snapshots(tmp_path / "in", failing(), first=12)
     update = watched.check()
     assert update.track.alarm.state == "alarm"
-    assert recorder.states == ["cannot-tell", "alarm"]
+    assert recorder.states == ["none", "alarm"]
     assert [FULL in sentence for sentence in update.failed] == [True]
     assert watched.check() is None  # the cause is stated once
     for number in range(12, 30):
@@ -114,19 +114,19 @@ def test_an_alarm_is_notified_while_the_store_cannot_be_written(tmp_path, disk):
     assert update.track.alarm.state == "alarm"
     assert watched.check() is None
     watched.close()
-    assert recorder.states == ["cannot-tell", "alarm"]
+    assert recorder.states == ["none", "alarm"]
     store = tmp_path / "out/asperity.db"
     assert query_store(store, "SELECT count(*), count(state), count(row) FROM recording") == [
         (37, 37, 37)
     ]
     assert query_store(store, "SELECT state, answered IS NULL FROM call") == [
-        ("cannot-tell", 0),
+        ("none", 0),
         ("alarm", 0),
     ]
     resumed = watch(tmp_path, notifiers=[recorder])
     assert resumed.check().track.alarm.state == "alarm"
     resumed.close()
-    assert recorder.states == ["cannot-tell", "alarm"]
+    assert recorder.states == ["none", "alarm"]
 
 
 def test_a_store_written_in_memory_first_equals_an_uninterrupted_one(tmp_path, disk):
@@ -313,7 +313,7 @@ def test_a_broken_network_is_stated_once(tmp_path, monkeypatch):
     assert watched.check().failed == ()
     broken.works = True
     assert watched.check().failed == ("recorder has been notified",)
-    assert broken.states == ["cannot-tell"]
+    assert broken.states == ["none"]
     watched.close()
 
 
@@ -344,7 +344,7 @@ def test_a_clock_that_jumps_neither_makes_blind_nor_delays_notifications(
     )
     recipient.works = True
     assert watched.check().failed == ("recorder has been notified",)
-    assert recipient.states == ["cannot-tell"]
+    assert recipient.states == ["none"]
     time.sleep(0.6)
     assert watched.check().judgement["alarm"]["state"] == "blind"
     watched.close()
@@ -469,12 +469,12 @@ def test_a_full_disk_does_not_end_a_watch(tmp_path, small_disk):
         assert condition()
 
     try:
-        wait(lambda: states() == ["cannot-tell"] and (small_disk / "report.html").exists())
+        wait(lambda: states() == ["none"] and (small_disk / "report.html").exists())
         with suppress(OSError), (small_disk / "filler").open("wb", 0) as filler:
             while True:
                 filler.write(b"0" * 4096)
         snapshots(tmp_path / "in", failing(), first=12)
-        wait(lambda: states() == ["cannot-tell", "alarm"])
+        wait(lambda: states() == ["none", "alarm"])
         (tmp_path / "in/s-012.npz").unlink()
         (small_disk / "filler").unlink()
         # the store may still have had space in its log
@@ -487,4 +487,4 @@ def test_a_full_disk_does_not_end_a_watch(tmp_path, small_disk):
     stored = query_store(small_disk / "asperity.db", "SELECT count(*), count(state) FROM recording")
     assert stored == [(36, 36)]
     assert (small_disk / "report.html").stat().st_size > 10_000
-    assert states() == ["cannot-tell", "alarm"]
+    assert states() == ["none", "alarm"]
