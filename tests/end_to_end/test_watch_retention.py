@@ -45,7 +45,7 @@ def query_store(store, query):
 @pytest.fixture(autouse=True)
 def _short_windows(monkeypatch):
     """Judge the first 8 and the latest 16 recordings, so that few recordings are a long series."""
-    monkeypatch.setattr("asperity.monitoring.ordering.LATEST", 16)
+    monkeypatch.setattr("asperity.monitoring.ordering.LATEST_JUDGED", 16)
     monkeypatch.setattr("asperity.monitoring.watching.watch_state.STRIDE", 8)
     monkeypatch.setattr(retention, "FIRST", 8)
     monkeypatch.setattr(retention, "LATEST", 16)

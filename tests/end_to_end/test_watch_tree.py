@@ -60,7 +60,7 @@ def test_each_subfolder_is_a_measuring_point_of_one_store(asp, plant):
     assert (code, err) == (3, "")
     lines = out.splitlines()
     assert len(lines) == 3
-    assert lines[0].startswith("fan 1/DE: Cannot tell")
+    assert lines[0].startswith("fan 1/DE: No alarm")
     assert lines[2].startswith("pump/stage 2/NDE: ALARM since s-")
     assert query_store(COUNTS) == STORED
     assert Path("plant/asperity-watch/pump/stage 2/NDE/report.html").is_file()

@@ -262,7 +262,7 @@ class Sensors:
         rows = dict(self.store.read(f"SELECT id, row FROM recording WHERE id IN {marks}", *numbers))
         return {
             "verdict": judgement.pop("verdict"),
-            "recordings": [json.loads(rows[number]) for number in numbers],
+            "recordings": [json.loads(rows[number]) for number in numbers if number in rows],
             **judgement,
         }
 
