@@ -61,7 +61,7 @@ def outliers(share: float, factor: float = 20.0) -> Course:
 
 
 def loads(factors: Iterable[float], mean_length: float) -> Course:
-    """Return constant levels of random lengths, as of loads that nobody states."""
+    """Return constant levels for random durations, as under unstated loads."""
     chosen = np.log([*factors])
 
     def course(rng: np.random.Generator, count: int) -> Levels:

@@ -17,7 +17,7 @@ import pytest
 
 from asperity.core.errors import AsperityError, UnreadableFile
 from asperity.monitoring import TrackSettings, WatchSettings, store_overview, watch_folder
-from asperity.monitoring.store.database import Store
+from asperity.monitoring.store.database import RENAMED, Store
 
 ONCE = ("--once", "--settle", "0", "--quiet")
 
@@ -55,7 +55,8 @@ def without_times(store):
             " ORDER BY id",
         ),
         query_store(
-            store, "SELECT name, settings, json_remove(said, '$.numbers') FROM sensor ORDER BY id"
+            store,
+            "SELECT name, settings, json_remove(content, '$.numbers') FROM sensor ORDER BY id",
         ),
     ]
 
@@ -350,6 +351,10 @@ def test_a_store_of_an_older_version_is_continued(asp, version):
             connection.execute("UPDATE sensor SET learned = x'0102'")
         connection.execute("DROP TABLE dropped")
         connection.execute("DROP TABLE gap")
+        connection.execute("DROP VIEW trend")
+        for table, old, new in RENAMED:
+            connection.execute(f"ALTER TABLE {table} RENAME COLUMN {new} TO {old}")
+        connection.execute("CREATE VIEW trend AS SELECT heard FROM recording")
         connection.execute(f"PRAGMA user_version = {version}")
         connection.commit()
     with closing(Store("plant.db")):
@@ -357,6 +362,7 @@ def test_a_store_of_an_older_version_is_continued(asp, version):
         assert learned == ([(b"\x01\x02",)] if version < 3 else [])
     snapshots("in", [20.0], first=36)
     assert asp("watch", "in", *ONCE, "--store", "plant.db")[0] == 3
+    assert len(query_store("plant.db", "SELECT arrived, rms FROM trend")) == 37
     durations = query_store("plant.db", "SELECT duration FROM recording")
     assert durations == [(pytest.approx(0.1),)] * 37
 

@@ -112,7 +112,7 @@ def test_deleted_recordings_count_as_positions_and_are_not_read_again(tmp_path):
     with closing(sqlite3.connect(tmp_path / "store.db")) as connection:
         for number in range(60):  # as if one had arrived per hour
             time = (START + timedelta(hours=number)).isoformat()
-            connection.execute("UPDATE recording SET heard = ? WHERE id = ?", (time, number + 1))
+            connection.execute("UPDATE recording SET arrived = ? WHERE id = ?", (time, number + 1))
         connection.commit()
     before = look(tmp_path)
     after = look(tmp_path, keep_s=86400.0)

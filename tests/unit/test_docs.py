@@ -49,7 +49,7 @@ EXCEPTIONS = {  # valid spans of no known kind
 JSON_EXCEPTIONS = {  # `--json` keys and values missing from the golden numbers
     "null": "a JSON literal",
     "seconds": "differs between runs",
-    "hears": "several sensors only",
+    "detects": "several sensors only",
     "alert": "a state that the golden series does not reach",
     "blind": "a state that the golden series does not reach",
     "reason": "refused files only",

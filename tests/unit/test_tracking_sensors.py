@@ -40,9 +40,9 @@ def test_channels_of_one_file_are_sensors_of_one_machine(sensor_files, tmp_path)
     assert crf == pytest.approx(TRUTH, abs=12.0)
     row = json.loads(json.dumps(track.scalars()))["recordings"][0]
     assert [*row["sensors"]] == ["a", "b"]
-    assert row["sensors"]["b"]["hears"] is True
+    assert row["sensors"]["b"]["detects"] is True
     assert row["sensors"]["b"]["rms"] != row["sensors"]["a"]["rms"]
-    assert {"rms_a", "rms_b", "hears_b"} <= set(track.table.columns)
+    assert {"rms_a", "rms_b", "detects_b"} <= set(track.table.columns)
     store_state = keep_track(
         track, tmp_path / "asperity.db", ReadOptions(channel="a,b"), machine="rig", point="ring"
     )

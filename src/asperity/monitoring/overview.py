@@ -107,7 +107,7 @@ def store_overview(path: str | Path) -> StoreOverview:
 def _sensor_row(store: Store, number: int, address: SensorAddress) -> dict[str, Any]:
     """Return a sensor's row."""
     ((count, last),) = store.read(
-        "SELECT count(*), max(heard) FROM recording WHERE sensor = ?", number
+        "SELECT count(*), max(arrived) FROM recording WHERE sensor = ?", number
     )
     judged = store.read(
         "SELECT state, since, reason, time, verdict FROM judgement WHERE sensor = ? AND state != ? "
@@ -118,7 +118,7 @@ def _sensor_row(store: Store, number: int, address: SensorAddress) -> dict[str, 
     state, since, reason, judged_at, verdict = judged[0] if judged else missing
     values = {
         "recordings": count,
-        "last_heard": last,
+        "last_arrival": last,
         "state": state,
         "since": since,
         "reason": reason,
@@ -130,13 +130,13 @@ def _table(store: Store) -> "pandas.DataFrame":
     import pandas
 
     rows = store.read(
-        "SELECT sensor, file, heard, started, state, row FROM recording ORDER BY sensor, id"
+        "SELECT sensor, file, arrived, started, state, row FROM recording ORDER BY sensor, id"
     )
     addresses: Mapping[int, SensorAddress] = dict(store.sensors())
     return pandas.DataFrame(
         {
             **addresses[sensor]._asdict(),
-            "heard": arrived,
+            "arrived": arrived,
             **(
                 {"file": file, "started": started or None, "state": state}
                 if row is None

@@ -39,7 +39,7 @@ class OnSensor:
         alone = self.alone
         return {
             "file": self.reading.file,
-            "hears": self.detects,  # key fixed by the JSON format
+            "detects": self.detects,
             "crf_hz": None if alone is None else finite_or_none(alone.crf_hz),
             "crf_std_hz": None if alone is None else finite_or_none(alone.crf_std_hz),
             "crfa": None if alone is None else finite_or_none(alone.crfa),

@@ -77,7 +77,7 @@ class Envelope:
         self.chunks += 1
 
     def range_hz(self, samples: int) -> tuple[float, float]:
-        """Return the lowest and highest rate [Hz] that the envelope of so many samples resolves."""
+        """Return the frequency range [Hz] that the envelope resolves for a number of samples."""
         size = min(samples, self.chunk)
         if (BAND[1] - BAND[0]) * size < MIN_SAMPLES:
             return np.inf, 0.0

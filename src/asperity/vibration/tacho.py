@@ -53,7 +53,7 @@ def turning_by_pulses(pulses: Field, rate_hz: float, per_turn: float = 1.0) -> T
 def turning_by_times(
     times_s: Field, samples: int, rate_hz: float, per_turn: float = 1.0
 ) -> Turning:
-    """Return the shaft angle at so many samples from the times of pulses [s], as for pulses.
+    """Return the shaft angle at each sample from the times of the pulses [s].
 
     Raises
     ------

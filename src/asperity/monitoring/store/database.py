@@ -19,7 +19,9 @@ from asperity.core.files import require_writable
 from asperity.trend import AlarmState
 
 STORE = "asperity.db"
-VERSION = 4  # 1: no duration of recordings; 2: `learned` is a column of `sensor`; 3: no `gap`
+VERSION = (
+    4  # 1: no duration of recordings; 2: `learned` is a column of `sensor`; 3: no `gap`, `RENAMED`
+)
 BUSY_S = 30.0  # timeout while another process writes [s]
 MISSING_S = 60.0  # time after which a missing folder of the store is made again [s]
 REMEDY = "delete it, and its recordings are read again, or choose another store"
@@ -31,6 +33,22 @@ DROPPED = (
     "version TEXT NOT NULL, PRIMARY KEY (sensor, file, version)) WITHOUT ROWID"
 )
 GAP = "CREATE TABLE gap (recording INTEGER PRIMARY KEY REFERENCES recording, count INTEGER)"
+TREND = """CREATE VIEW trend AS
+    SELECT machine.name AS machine, point.name AS point, sensor.name AS sensor, recording.file,
+        recording.arrived, recording.started, recording.state, json_extract(row, '$.x') AS x,
+        json_extract(row, '$.crf_hz') AS crf_hz,
+        json_extract(row, '$.crf_std_hz') AS crf_std_hz, json_extract(row, '$.rms') AS rms,
+        json_extract(row, '$.kurtosis') AS kurtosis,
+        json_extract(row, '$.velocity_rms') AS velocity_rms, json_extract(row, '$.zone') AS zone,
+        json_extract(row, '$.reason') AS reason
+    FROM recording JOIN sensor ON sensor.id = recording.sensor JOIN point ON point.id = sensor.point
+        JOIN machine ON machine.id = point.machine"""
+RENAMED = (  # table, old and new name of a column
+    ("recording", "heard", "arrived"),
+    ("sensor", "asked", "question"),
+    ("sensor", "said", "content"),
+    ("call", "said", "content"),
+)
 SCHEMA = f"""
 CREATE TABLE machine (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE);
 CREATE TABLE point (
@@ -38,14 +56,14 @@ CREATE TABLE point (
     UNIQUE (machine, name));
 CREATE TABLE sensor (
     id INTEGER PRIMARY KEY, point INTEGER NOT NULL REFERENCES point, name TEXT NOT NULL,
-    settings TEXT NOT NULL, asked TEXT, said TEXT, since INTEGER, UNIQUE (point, name));
+    settings TEXT NOT NULL, question TEXT, content TEXT, since INTEGER, UNIQUE (point, name));
 {LEARNED};
 {LEVELS};
 {DROPPED};
 {GAP};
 CREATE TABLE recording (
     id INTEGER PRIMARY KEY, sensor INTEGER NOT NULL REFERENCES sensor, file TEXT NOT NULL,
-    version TEXT NOT NULL, heard TEXT NOT NULL, started TEXT, duration REAL,
+    version TEXT NOT NULL, arrived TEXT NOT NULL, started TEXT, duration REAL,
     refused INTEGER NOT NULL, state TEXT, row TEXT, reading BLOB NOT NULL,
     UNIQUE (sensor, file, version));
 CREATE TABLE judgement (
@@ -54,20 +72,11 @@ CREATE TABLE judgement (
     verdict TEXT, recordings INTEGER, new INTEGER);
 CREATE TABLE call (
     id INTEGER PRIMARY KEY, sensor INTEGER NOT NULL REFERENCES sensor, who TEXT NOT NULL,
-    state TEXT NOT NULL, said TEXT NOT NULL, time TEXT NOT NULL,
+    state TEXT NOT NULL, content TEXT NOT NULL, time TEXT NOT NULL,
     attempts INTEGER NOT NULL DEFAULT 0, due REAL NOT NULL DEFAULT 0, failure TEXT, answered TEXT);
 CREATE INDEX calls ON call (sensor, who);
 CREATE INDEX judgements ON judgement (sensor, state);
-CREATE VIEW trend AS
-    SELECT machine.name AS machine, point.name AS point, sensor.name AS sensor, recording.file,
-        recording.heard, recording.started, recording.state, json_extract(row, '$.x') AS x,
-        json_extract(row, '$.crf_hz') AS crf_hz,
-        json_extract(row, '$.crf_std_hz') AS crf_std_hz, json_extract(row, '$.rms') AS rms,
-        json_extract(row, '$.kurtosis') AS kurtosis,
-        json_extract(row, '$.velocity_rms') AS velocity_rms, json_extract(row, '$.zone') AS zone,
-        json_extract(row, '$.reason') AS reason
-    FROM recording JOIN sensor ON sensor.id = recording.sensor JOIN point ON point.id = sensor.point
-        JOIN machine ON machine.id = point.machine;
+{TREND};
 """
 
 
@@ -245,6 +254,10 @@ class Store:
                 run(LEVELS)
                 run(DROPPED)
                 run(GAP)
+                run("DROP VIEW trend")
+                for table, old, new in RENAMED:
+                    run(f"ALTER TABLE {table} RENAME COLUMN {old} TO {new}")
+                run(TREND)
                 run("PRAGMA user_version = 4")
 
     @contextmanager

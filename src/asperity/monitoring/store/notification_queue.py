@@ -43,7 +43,7 @@ class NotificationQueue:
         `run` is that of the judgement's transaction: neither is stored without the other.
         """
         for name in recipients:
-            query = "SELECT state, said FROM call WHERE sensor = ? AND who = ? ORDER BY id DESC"
+            query = "SELECT state, content FROM call WHERE sensor = ? AND who = ? ORDER BY id DESC"
             last = run(f"{query} LIMIT 1", (sensor, name)).fetchone()
             before, sent = (None, {}) if last is None else (last[0], json.loads(last[1]))
             # stores of older versions have no causes
@@ -58,7 +58,7 @@ class NotificationQueue:
                     **content,
                 }
                 run(
-                    "INSERT INTO call (sensor, who, state, said, time) VALUES (?, ?, ?, ?, ?)",
+                    "INSERT INTO call (sensor, who, state, content, time) VALUES (?, ?, ?, ?, ?)",
                     (
                         sensor,
                         name,
@@ -71,7 +71,7 @@ class NotificationQueue:
     def pending(self, sensor: int, recipient: str) -> list[PendingNotification]:
         """Return notifications that a recipient has not received yet, in order."""
         rows = self.store.read(
-            "SELECT id, attempts, due, said FROM call WHERE sensor = ? AND who = ? "
+            "SELECT id, attempts, due, content FROM call WHERE sensor = ? AND who = ? "
             "AND answered IS NULL ORDER BY id",
             *(sensor, recipient),
         )

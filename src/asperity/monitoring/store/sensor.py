@@ -63,7 +63,7 @@ class Sensor:
                     "keep the former value, or choose another `out` or another sensor"
                 )
         rows = store.read(
-            "SELECT file, version, id, started, heard, state, refused, duration, "
+            "SELECT file, version, id, started, arrived, state, refused, duration, "
             "length(reading) > 0, count FROM recording LEFT JOIN gap ON recording = id "
             "WHERE sensor = ? ORDER BY id",
             self.number,
@@ -125,7 +125,7 @@ class Sensor:
         with self.store.transaction() as run:
             run(
                 "INSERT INTO recording "
-                "(sensor, file, version, heard, started, refused, duration, reading) "
+                "(sensor, file, version, arrived, started, refused, duration, reading) "
                 "VALUES (?, ?, ?, ?, ?, ?, ?, ?) "
                 # by another watch
                 "ON CONFLICT (sensor, file, version) DO UPDATE SET reading = excluded.reading",
@@ -171,7 +171,7 @@ class Sensor:
     def times(self) -> dict[FileVersion, datetime]:
         """Return start or arrival of every recording, as UTC where no zone is known."""
         rows = self.store.read(
-            "SELECT file, version, started, heard FROM recording WHERE sensor = ?", self.number
+            "SELECT file, version, started, arrived FROM recording WHERE sensor = ?", self.number
         )
         return {
             FileVersion(file, version): _as_utc(datetime.fromisoformat(started or arrived))

@@ -249,11 +249,11 @@ class Sensors:
     @property
     def last_question(self) -> str | None:
         """Digest of the settings and recordings of the last judgement."""
-        return self._of_first("asked")
+        return self._of_first("question")
 
     def last_judgement(self) -> dict[str, Any] | None:
         """Return the last judgement as in `asperity track --json`; None before the first."""
-        text = self._of_first("said")
+        text = self._of_first("content")
         if text is None:
             return None
         judgement: dict[str, Any] = json.loads(text)
@@ -323,7 +323,7 @@ class Sensors:
             for sensor in self._sensors():
                 sensor.insert_judgement(run, entry)
                 run(
-                    "UPDATE sensor SET asked = ?, said = ? WHERE id = ?",
+                    "UPDATE sensor SET question = ?, content = ? WHERE id = ?",
                     (question, content, sensor.number),
                 )
             self._queue(run, recipients, notification_content(judgement, lines[-1]["file"]))
