@@ -1,5 +1,6 @@
-"""Fixtures for the command-line tests: a command runner and a small emulator."""
+"""Fixtures for the command-line tests: a command runner, a small emulator, a full disk."""
 
+import sqlite3
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pytest
 from asperity.case import load_case
 from asperity.cli import main
 from asperity.inference import build_emulator, inference_setting
+from asperity.monitoring.store import database
 from support.emulated import CASE, SMALL
 
 PAPER = (Path(__file__).parents[2] / "examples" / "paper.toml").read_text("utf-8")
@@ -40,3 +42,29 @@ def small(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch, ThreadPoolExecutor(1) as executor:
         patch.setattr("asperity.inference.emulator.FINER_POINTS", 6)
         yield setting, build_emulator(setting, folder=folder, executor=executor), folder
+
+
+@pytest.fixture
+def disk(monkeypatch):
+    """A disk that is full while `full` is set: SQLite cannot write."""
+
+    class Disk:
+        full = False
+
+    class Connection(sqlite3.Connection):
+        file = ""
+
+        def execute(self, statement, *values):
+            if Disk.full and self.file != ":memory:" and statement.startswith(("INS", "UPD")):
+                raise sqlite3.OperationalError("database or disk is full")
+            return super().execute(statement, *values)
+
+    def connect(file, **options):
+        connection = original(file, factory=Connection, **options)
+        connection.file = str(file)
+        return connection
+
+    original = sqlite3.connect
+    monkeypatch.setattr(database.sqlite3, "connect", connect)
+    yield Disk
+    monkeypatch.undo()

@@ -55,30 +55,15 @@ class Recorder:
         self.states.append(notification["state"])
 
 
-@pytest.fixture
-def disk(monkeypatch):
-    """A disk that is full while `full` is set: SQLite cannot write."""
+class Broken(Recorder):
+    """Recipient that cannot be reached until it `works`."""
 
-    class Disk:
-        full = False
+    works = False
 
-    class Connection(sqlite3.Connection):
-        file = ""
-
-        def execute(self, statement, *values):
-            if Disk.full and self.file != ":memory:" and statement.startswith(("INS", "UPD")):
-                raise sqlite3.OperationalError(FULL)
-            return super().execute(statement, *values)
-
-    def connect(file, **options):
-        connection = original(file, factory=Connection, **options)
-        connection.file = str(file)
-        return connection
-
-    original = sqlite3.connect
-    monkeypatch.setattr(database.sqlite3, "connect", connect)
-    yield Disk
-    monkeypatch.undo()
+    def send(self, notification):
+        if not self.works:
+            raise OSError("connection refused")
+        super().send(notification)
 
 
 def watch(tmp_path, **changes):
@@ -296,14 +281,6 @@ def test_a_failing_evaluation_is_stated_once_and_repeated(tmp_path, monkeypatch)
 
 
 def test_a_broken_network_is_stated_once(tmp_path, monkeypatch):
-    class Broken(Recorder):
-        works = False
-
-        def send(self, notification):
-            if not self.works:
-                raise OSError("connection refused")
-            super().send(notification)
-
     monkeypatch.setattr("asperity.monitoring.notify.RETRY_S", 0.0)
     broken = Broken()
     snapshots(tmp_path / "in", np.ones(9))
@@ -321,14 +298,6 @@ def test_a_broken_network_is_stated_once(tmp_path, monkeypatch):
 def test_a_clock_that_jumps_neither_makes_blind_nor_delays_notifications(
     tmp_path, monkeypatch, jump
 ):
-    class Broken(Recorder):
-        works = False
-
-        def send(self, notification):
-            if not self.works:
-                raise OSError("connection refused")
-            super().send(notification)
-
     class Clock(datetime):
         @classmethod
         def now(cls, zone=None):

@@ -11,7 +11,6 @@ import pytest
 from asperity.core.errors import BadInput
 from asperity.monitoring import WatchSettings, watch_tree
 from asperity.monitoring.fleet import tree_watch
-from asperity.monitoring.store import database
 
 ONCE = ("--once", "--settle", "0")
 WATCHING = WatchSettings(poll_interval_s=0.0, settle_time_s=0.0)
@@ -135,31 +134,16 @@ def test_spectra_released_from_memory_are_read_from_the_store(plant, monkeypatch
     updates.close()
 
 
-def test_a_full_disk_is_stated_once_for_all_places(plant, monkeypatch):
-    class Connection(sqlite3.Connection):
-        full, file = False, ""
-
-        def execute(self, statement, *values):
-            if Connection.full and self.file != ":memory:" and statement.startswith("INS"):
-                raise sqlite3.OperationalError("database or disk is full")
-            return super().execute(statement, *values)
-
-    def connect(file, **options):
-        connection = original(file, factory=Connection, **options)
-        connection.file = str(file)
-        return connection
-
-    original = sqlite3.connect
-    monkeypatch.setattr(database.sqlite3, "connect", connect)
+def test_a_full_disk_is_stated_once_for_all_places(plant, disk):
     updates = watch_tree(plant, plant.parent / "out", watching=WATCHING)
     assert len([next(updates) for _ in range(3)]) == 3
-    Connection.full = True
+    disk.full = True
     for place in ("fan 1/DE", "pump/stage 2/NDE"):
         snapshots(f"plant/{place}", [20.0], first=40)
     later = [next(updates) for _ in range(2)]
     assert [len(update.new) for update in later] == [1, 1]
     assert sum(len(update.failed) for update in later) == 1
-    Connection.full = False
+    disk.full = False
     later = [next(updates) for _ in range(2)]
     assert [sentence.partition("asperity.db ")[2] for sentence in later[0].failed] == [
         "is written again; nothing was lost"
