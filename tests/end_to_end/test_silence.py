@@ -81,6 +81,8 @@ def test_a_sensor_that_delivers_nothing_is_blind_and_notified_once(asp):
     result = json.loads(out)
     assert (code, result["alarm"]["state"], result["alarm"]["raised_by"]) == (5, "blind", "silence")
     assert result["verdict"].startswith("Blind: no recording has come for")
+    assert result["sensor"]["state"] == "blind"
+    assert result["alarm"]["causes"] == ["silence"]
     assert "the limit is 0.5 s" in result["alarm"]["reason"]
     assert asp("store", "plant.db", "--quiet")[0] == 5
     page = Path(result["results"], "report.html").read_text("utf-8")
@@ -108,6 +110,8 @@ def test_an_alarm_remains_without_recordings(asp):
     )
     assert result["verdict"].startswith("Blind: no recording has come")
     assert "ALARM since" in result["verdict"]
+    assert result["sensor"]["state"] == "blind"
+    assert result["alarm"]["causes"] == ["level", "silence"]
     page = Path(result["results"], "report.html").read_text("utf-8")
     assert "ALARM since" in page
     assert "No recording has come for" in page

@@ -246,6 +246,11 @@ def test_a_helical_case_is_rated():
     ratio = loading(case.machine) / loading(load_machine(EXAMPLES / "fzg-c.toml").machine)
     both = [ratings["mesh_friction"].machine_value for ratings in (found, spur)]
     assert both[0] / both[1] == pytest.approx(ratio, rel=1e-9)
+    wide = helical_case(face_width="60 mm")
+    load_factor = helical_load_factor(wide.machine.contact_ratio + wide.machine.overlap_ratio)
+    assert load_factor > 1.1
+    friction_of_wide = machine_conditions(wide).ratings[0].machine_value
+    assert friction_of_wide / both[0] == pytest.approx((load_factor * 14.0 / 60.0) ** 0.2, rel=1e-9)
     steep = machine_conditions(helical_case(helix_angle="32 deg", profile_shift=[0.0, 0.0]))
     assert "a helix angle of 32 deg (30 at most)" in steep.ratings[0].beyond
 
