@@ -60,7 +60,7 @@ def write(folder, levels, first=0, unit="m/s^2"):
 # ---------------------------------------------------------------------------------
 
 
-def test_a_memory_stands_for_the_recordings_that_are_left_out():
+    """Judge the first 8 and the latest 112 of 300 recordings, with the memory between."""
     """Of 300 recordings a watch judges the first 8 and the latest 112, with its memory."""
     values = noise(1, 300) + np.linspace(0.0, 0.9, 300)
     whole = judged(values, 300).judgement()
