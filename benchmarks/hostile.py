@@ -1,8 +1,9 @@
 """`asperity watch` on a disordered logger folder: one watch runs undisturbed, one is killed ten
-times.
+times, its disk is full, permissions are lost, its clock jumps, and other programs lock its store.
 
-Files arrive late, in parts, twice, from a clock that is ahead, and from other programs. At the end
-every file must have an outcome on each sensor, and both stores must be equal. `python -m
+Files arrive late, in parts, twice, under another name later, from a clock that is ahead, and from
+other programs; some are huge. At the end every file must have an outcome on each sensor, and both
+stores must be equal. `python -m
 benchmarks.hostile --minutes 60 [--kills 10] [--sensors 2]` runs this part alone. It needs little
 CPU time but the full elapsed time.
 """
@@ -10,24 +11,37 @@ CPU time but the full elapsed time.
 import argparse
 import os
 import shutil
-import signal
 import sqlite3
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import closing
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import monotonic, sleep, time
+from typing import TypeAlias
 
 import numpy as np
 
 from asperity.monitoring.files import may_be_recording
+from benchmarks.disturbances import DisturbedWatch, can_mount, schedule
 
 RATE, SECONDS = 20e3, 0.1
 AHEAD_S = 30 * 86_400.0
 PARTS_S = 3.0  # between the two halves of a file in progress
+HUGE_S = 600.0  # of a huge recording
+HUGE_AT = (0.25, 0.5, 0.75)  # shares of the time at which one arrives
+DISTURBED_SHARE = 0.01  # of the time, during which a disturbance lasts
+INSTANT = ("kill", "jump_clock")  # disturbances that may occur during another one
+NAMES = {
+    "kill": "kills",
+    "jump_clock": "jumps of the clock by 400 days",
+    "lock_store": "locks of the store",
+    "fill_disk": "full disks",
+    "forbid_folder": "times without permission to read the folder",
+    "forbid_results": "times without permission to write the results",
+}
 KINDS = ("plain",) * 6 + (
     "late",
     "in parts",
@@ -38,11 +52,13 @@ KINDS = ("plain",) * 6 + (
     "half copied",
     "empty",
     "again",
+    "renamed",
 )
+Plan: TypeAlias = list[tuple[float, str]]
 
 
-def recorded(number: int, sensor: int) -> np.ndarray:
-    return np.random.default_rng([number, sensor]).standard_normal(round(SECONDS * RATE))
+def recorded(number: int, sensor: int, seconds: float) -> np.ndarray:
+    return np.random.default_rng([number, sensor]).standard_normal(round(seconds * RATE))
 
 
 def channels(sensors: int) -> list[str]:
@@ -50,8 +66,10 @@ def channels(sensors: int) -> list[str]:
     return [f"acc{sensor}" for sensor in range(1, sensors + 1)]
 
 
-def write(path: Path, number: int, sensors: int) -> None:
-    signals = {name: recorded(number, sensor) for sensor, name in enumerate(channels(sensors))}
+def write(path: Path, number: int, sensors: int, seconds: float = SECONDS) -> None:
+    signals = {
+        name: recorded(number, sensor, seconds) for sensor, name in enumerate(channels(sensors))
+    }
     with path.open("wb") as file:
         np.savez(file, **signals, fs=RATE, unit="m/s^2")
 
@@ -80,7 +98,10 @@ def arrive(folder: Path, number: int, kind: str, sensors: int) -> None:
     elif kind == "empty":
         path.touch()
     else:
-        write(path, number, sensors)
+        write(path, number, sensors, HUGE_S if kind == "huge" else SECONDS)
+    if kind == "renamed":
+        sleep(PARTS_S)
+        path.rename(path.with_stem(f"{path.stem}-moved"))
     if kind == "twice":
         shutil.copy(path, path.with_stem(f"{path.stem}-copy"))
     if kind == "ahead":
@@ -148,6 +169,43 @@ def accounted(folder: Path, store: Path, sensors: int) -> tuple[Counter[str], li
     return counts, unreported
 
 
+def memory_text(values_mb: Sequence[float]) -> str:
+    """Return the median memory of the second and of the last quarter of a run."""
+    quarters = np.array_split(np.array(values_mb), 4)
+    second, last = (np.median(quarter) for quarter in (quarters[1], quarters[-1]))
+    return f"{second:.0f}, {last:.0f} MB"
+
+
+def arrivals(
+    folder: Path, minutes: float, sensors: int, watches: Sequence[DisturbedWatch], plan: Plan
+) -> Iterator[int]:
+    """Let files arrive for some minutes, disturb the last watch by a plan; yield their number."""
+    rng, began = np.random.default_rng(1), monotonic()
+    end, number = began + 60.0 * minutes, 0
+    huge = [began + share * 60.0 * minutes for share in HUGE_AT]
+    ends: list[tuple[float, Callable[[], None]]] = []
+    disturbed = watches[-1]
+    while monotonic() < end or plan:
+        kind = "huge" if huge and monotonic() > huge[0] else str(rng.choice(KINDS))
+        huge = huge[1:] if kind == "huge" else huge
+        with suppress(PermissionError):  # while the folder is forbidden
+            arrive(folder, number, kind, sensors)
+            number += 1
+        while ends and monotonic() > ends[0][0]:
+            ends.pop(0)[1]()
+        while plan and monotonic() > plan[-1][0] and (not ends or plan[-1][1] in INSTANT):
+            ending = disturbed.disturb(plan.pop()[1])
+            ends += [] if ending is None else [ending]
+        for watched in watches:
+            watched.check()
+        sleep(float(rng.uniform(0.2, 1.8)) * 60.0 * minutes / 120.0)
+        if number % 10 == 0:
+            yield number
+    for _, ending in ends:
+        ending()
+    yield number
+
+
 def run(
     minutes: float,
     kills: int,
@@ -157,40 +215,37 @@ def run(
     say: Callable[[str], None] = print,
 ) -> Iterator[str]:
     """Yield the lines of a table."""
+    disk = can_mount()
     with TemporaryDirectory() as name:
         folder = Path(name) / "in"
         folder.mkdir()
-        rng, began = np.random.default_rng(1), monotonic()
-        end = began + 60.0 * minutes
-        outs = {"undisturbed": Path(name) / "alone", f"killed {kills} times": Path(name) / "killed"}
+        began = monotonic()
+        outs = [Path(name) / "alone", Path(name) / "disturbed"]
         pace = {"every": every, "settle": settle}
-        commands = [watch(folder, out, sensors=sensors, **pace) for out in outs.values()]
-        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-        alone, killed = (subprocess.Popen(command, **quiet) for command in commands)
-        deaths = sorted(rng.uniform(began + 1.0, end, kills))
-        number = 0
+        watches = [
+            DisturbedWatch(
+                watch(folder, out, sensors=sensors, **pace)[3:],
+                folder,
+                out,
+                DISTURBED_SHARE * 60.0 * minutes,
+                disk=disk and out == outs[-1],
+            )
+            for out in outs
+        ]
+        plan = schedule(kills, began + 1.0, began + 60.0 * minutes, disk=disk, seed=1)
         try:
-            while monotonic() < end or deaths:
-                arrive(folder, number, str(rng.choice(KINDS)), sensors)
-                number += 1
-                while deaths and monotonic() > deaths[0]:
-                    deaths.pop(0)
-                    killed.send_signal(signal.SIGKILL)
-                    killed.wait()
-                    killed = subprocess.Popen(commands[1], **quiet)
-                sleep(float(rng.uniform(0.2, 1.8)) * 60.0 * minutes / 120.0)
-                if number % 10 == 0:
-                    say(f"{number} arrivals after {monotonic() - began:.0f} s")
+            for number in arrivals(folder, minutes, sensors, watches, plan):
+                say(f"{number} arrivals after {monotonic() - began:.0f} s")
             sleep(2.0 * settle)
         finally:
-            for process in (alone, killed):
-                process.kill()
-                process.wait()
-        for out in outs.values():
+            for watched in watches:
+                watched.close()
+        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        for out in outs:
             subprocess.run(
                 watch(folder, out, "--once", sensors=sensors, **pace), check=False, **quiet
             )
-        stores = [out / "asperity.db" for out in outs.values()]
+        stores = [out / "asperity.db" for out in outs]
         counts, unreported = accounted(folder, stores[1], sensors)
         first, second = (latest(store) for store in stores)
         differ = sorted(
@@ -200,7 +255,15 @@ def run(
         yield "| disordered logger folder | |"
         yield "|---|---|"
         took = (monotonic() - began) / 60.0
-        yield f"| minutes, arrivals, kills, sensors | {took:.1f}, {number}, {kills}, {sensors} |"
+        yield f"| minutes, arrivals, sensors | {took:.1f}, {number}, {sensors} |"
+        for kind, many in watches[1].counts.items():
+            yield f"| {NAMES[kind]} | {many} |"
+        yield f"| ends of the watches without a kill | {watches[0].ended}, {watches[1].ended} |"
+        for text, watched in zip(("undisturbed", "disturbed"), watches, strict=True):
+            yield (
+                f"| memory of the {text} watch, second and last quarter | "
+                f"{memory_text(watched.memory_mb)} |"
+            )
         yield from (f"| {outcome} | {many} |" for outcome, many in sorted(counts.items()))
         yield f"| files without an outcome | {len(unreported)} {' '.join(unreported[:3])} |"
         same = len(first.keys() | second.keys()) - len(differ)

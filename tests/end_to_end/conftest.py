@@ -46,15 +46,22 @@ def small(tmp_path_factory):
 
 @pytest.fixture
 def disk(monkeypatch):
-    """A disk that is full while `full` is set: SQLite cannot write."""
+    """A disk that is full while `full` is set: SQLite cannot write.
+
+    While `closed`, the store cannot be opened either, except as an unchanging file: SQLite has no
+    space for its index of a write-ahead log. While `lost`, not even that.
+    """
 
     class Disk:
-        full = False
+        full = closed = lost = False
 
     class Connection(sqlite3.Connection):
         file = ""
 
         def execute(self, statement, *values):
+            on_disk = self.file != ":memory:"
+            if on_disk and (Disk.lost or (Disk.closed and "immutable" not in self.file)):
+                raise sqlite3.OperationalError("disk I/O error")
             if Disk.full and self.file != ":memory:" and statement.startswith(("INS", "UPD")):
                 raise sqlite3.OperationalError("database or disk is full")
             return super().execute(statement, *values)

@@ -71,7 +71,7 @@ def watch(tmp_path, **changes):
     store = changes.pop("store", tmp_path / "out/asperity.db")
     return open_watch(
         (tmp_path / "in").resolve(),
-        database.Store(store),
+        database.Store(store, patient=not changes.get("once")),
         TrackSettings(**changes.pop("tracking", {})),
         WatchSettings(**{"poll_interval_s": 0.0, "settle_time_s": 0.0} | changes),
     )
@@ -457,3 +457,86 @@ def test_a_full_disk_does_not_end_a_watch(tmp_path, small_disk):
     assert stored == [(36, 36)]
     assert (small_disk / "report.html").stat().st_size > 10_000
     assert states() == ["none", "alarm"]
+
+
+# Start on a full disk
+# ---------------------------------------------------------------------------------
+
+
+def stored_rows(tmp_path):
+    rows = "SELECT file, state, row, reading FROM recording ORDER BY file"
+    return query_store(tmp_path / "out/asperity.db", rows)
+
+
+def test_a_new_sensor_starts_on_a_full_disk(tmp_path, disk):
+    recorder = Recorder()
+    levels = [*np.ones(12), *failing()]
+    snapshots(tmp_path / "in", levels)
+    stores = []
+    for full in (False, True):
+        watch(tmp_path).close()  # an empty store
+        disk.full = full
+        watched = watch(tmp_path, notifiers=[recorder] if full else ())
+        update = watched.check()
+        assert update.track.alarm.state == "alarm"
+        assert [FULL in sentence for sentence in update.failed] == [True] * full
+        disk.full = False
+        if full:
+            assert stored_rows(tmp_path) == []
+            assert "is written again" in watched.check().failed[0]
+        watched.close()
+        stores.append(stored_rows(tmp_path))
+        (tmp_path / "out/asperity.db").unlink()
+    assert stores[0] == stores[1]
+    assert recorder.states == ["alarm"]
+
+
+def test_a_store_without_space_for_its_index_is_read(tmp_path, disk):
+    snapshots(tmp_path / "in", [*np.ones(12), *failing()])
+    watched = watch(tmp_path, tracking={"acknowledge": "last"})
+    watched.check()
+    watched.close()
+    for file in (tmp_path / "in").iterdir():
+        file.unlink()  # the history is in the store only
+    disk.full = disk.closed = True
+    recorder = Recorder()
+    watched = watch(tmp_path, notifiers=[recorder])
+    snapshots(tmp_path / "in", [20.0] * 3, first=36)
+    update = watched.check()
+    assert len(update.track.scalars()["recordings"]) == 39
+    assert update.track.alarm.state == "cannot-tell"
+    assert "disk I/O error" in update.failed[0]
+    disk.full = disk.closed = False
+    assert "is written again" in watched.check().failed[0]
+    watched.close()
+    assert len(stored_rows(tmp_path)) == 39
+    assert recorder.states == ["cannot-tell"]
+
+
+def test_files_are_judged_while_the_store_cannot_be_read(tmp_path, disk):
+    snapshots(tmp_path / "in", [*np.ones(12), *failing()])
+    watched = watch(tmp_path, tracking={"acknowledge": "last"})
+    assert watched.check().track.alarm.state == "none"
+    watched.close()
+    disk.full = disk.lost = True
+    recorder = Recorder()
+    watched = watch(tmp_path, notifiers=[recorder])
+    assert watched.check().track.alarm.state == "alarm"  # the acknowledgement cannot be read
+    snapshots(tmp_path / "in", [20.0], first=36)
+    watched.check()
+    disk.full = disk.lost = False
+    update = watched.check()
+    assert update.track.alarm.state == "cannot-tell"  # few recordings since
+    watched.close()
+    assert len(stored_rows(tmp_path)) == 37
+    assert recorder.states == ["alarm", "cannot-tell"]
+    acknowledged = "SELECT count(*) FROM judgement WHERE state = 'acknowledged'"
+    assert query_store(tmp_path / "out/asperity.db", acknowledged) == [(1,)]
+
+
+def test_a_single_run_on_a_full_disk_fails(tmp_path, disk):
+    snapshots(tmp_path / "in", np.ones(3))
+    watch(tmp_path).close()
+    disk.full = True
+    with pytest.raises(database.StoreUnavailable, match=FULL):
+        watch(tmp_path, once=True).check()

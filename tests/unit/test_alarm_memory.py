@@ -55,10 +55,8 @@ def write(folder, levels, first=0, unit="m/s^2"):
         values = level * np.random.default_rng(number).standard_normal(1000)
         np.savez(folder / f"s-{number:04}.npz", acc=values, fs=20e3, unit=unit)
 
-
-# Memory
-# ---------------------------------------------------------------------------------
-
+    # Memory
+    # ---------------------------------------------------------------------------------
 
     """Judge the first 8 and the latest 112 of 300 recordings, with the memory between."""
     """Of 300 recordings a watch judges the first 8 and the latest 112, with its memory."""

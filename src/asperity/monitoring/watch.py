@@ -18,7 +18,7 @@ from asperity.monitoring.fleet.tree_watch import TreeWatch
 from asperity.monitoring.forecast import Forecaster, ForecastSchedule
 from asperity.monitoring.reading import Reading
 from asperity.monitoring.settings import TrackSettings, WatchSettings
-from asperity.monitoring.store.database import STORE, Store
+from asperity.monitoring.store.database import STORE, Store, StoreUnavailable
 from asperity.monitoring.store.sensor_lookup import open_sensors
 from asperity.monitoring.target import search_target
 from asperity.monitoring.watching.folder_watch import FolderWatch
@@ -59,11 +59,10 @@ def watch_folder(
         which the store was begun.
     """
     folder = _checked(folder, watching)
-    make_folder(Path(out))
     return _updates(
         open_watch(
             folder,
-            Store(watching.store or Path(out) / STORE),
+            _open_store(Path(out), watching),
             settings,
             watching,
             case=case,
@@ -108,7 +107,6 @@ def watch_tree(
             "omit it, or watch a single folder"
         )
     folder = _checked(folder, watching)
-    make_folder(Path(out))
     open_place = partial(
         open_watch,
         settings=settings,
@@ -117,7 +115,14 @@ def watch_tree(
         forecaster=forecaster,
         progress=progress,
     )
-    return _tree_updates(TreeWatch(folder, Path(out), watching, open_place))
+    store = _open_store(Path(out), watching)
+    return _tree_updates(TreeWatch(folder, Path(out), store, watching, open_place))
+
+
+def _open_store(out: Path, watching: WatchSettings) -> Store:
+    """Return the store of a watch, which may be written later, such as after a full disk."""
+    make_folder(out)
+    return Store(watching.store or out / STORE, patient=not watching.once)
 
 
 def _checked(folder: str | Path, watching: WatchSettings) -> Path:
@@ -155,10 +160,15 @@ def open_watch(
         target=target,
         options=settings.read_options,
     )
-    sensors = reopen(store)
+    try:
+        sensors = reopen(store)
+    except StoreUnavailable:  # a new sensor, on a full disk
+        if watching.once:
+            raise
+        sensors = reopen(Store(store.path, in_memory=True))
     sensors.notifications.notify_states = watching.notify_states
     state = WatchState(sensors, target, settings, watching, ForecastSchedule(forecaster))
-    return FolderWatch(state, folder, table, progress, reopen)
+    return FolderWatch(state, store, folder, table, progress, reopen)
 
 
 def _updates(watch: FolderWatch) -> Generator[Update]:

@@ -10,7 +10,7 @@ from asperity.core.errors import AsperityError
 from asperity.core.troubles import Troubles, failure_reason
 from asperity.monitoring.files import is_utf8, may_be_recording, natural_order
 from asperity.monitoring.settings import WatchSettings
-from asperity.monitoring.store.database import STORE, Store
+from asperity.monitoring.store.database import Store
 from asperity.monitoring.watching.folder_watch import FolderWatch
 from asperity.monitoring.watching.watch_state import Update
 
@@ -52,6 +52,7 @@ class TreeWatch:
     Parameters
     ----------
     root, out, watching : as `watch_tree`
+    store : of all folders
     open_place : returns the watch of a folder, with the store and its own settings
     """
 
@@ -59,12 +60,13 @@ class TreeWatch:
         self,
         root: Path,
         out: Path,
+        store: Store,
         watching: WatchSettings,
         open_place: Callable[..., FolderWatch],
     ) -> None:
         self.root, self.out, self.watching = root, out.resolve(), watching
         self.open_place = open_place
-        self.store = Store(watching.store or out / STORE)
+        self.store = store
         self.troubles = Troubles()
         self.watches: dict[Path, FolderWatch] = {}
         self._recent: dict[Path, int] = {}  # memory for spectra [bytes], the latest use last

@@ -14,7 +14,7 @@ from time import monotonic
 from typing import Any, NamedTuple, TypeAlias
 
 from asperity.core.documents import JsonObject, Table
-from asperity.core.errors import AsperityError, UnreadableFile
+from asperity.core.errors import AsperityError, BadInput, UnreadableFile
 from asperity.core.files import require_writable
 from asperity.trend import AlarmState
 
@@ -131,21 +131,43 @@ class StoredRecording(NamedTuple):
 class Store:
     """Store of recordings and judgements; created if the file does not exist.
 
+    With `patient`, a file that cannot be used at present is read only, or replaced by an empty
+    store in memory, until `recover` succeeds.
+
     Raises
     ------
     BadInput
         if the path is not writable.
     UnreadableFile
         if the file is not a store, or of a later version.
+    StoreUnavailable
+        if the file cannot be used at present, unless `patient`.
     """
 
-    def __init__(self, path: str | Path, *, make: bool = True, in_memory: bool = False) -> None:
+    def __init__(
+        self,
+        path: str | Path,
+        *,
+        make: bool = True,
+        in_memory: bool = False,
+        patient: bool = False,
+    ) -> None:
         self.path = Path(path)
         self._in_memory = in_memory
         self._missing_since: float | None = None
+        self._unavailable: StoreUnavailable | None = None  # until the file is opened for writing
         if not (in_memory or make or self.path.exists()):
             raise UnreadableFile(f"{self.path} does not exist; check its name")
-        self._open()
+        try:
+            self._open()
+        except StoreUnavailable as error:
+            if not patient:
+                raise
+            self._open_provisionally(error)
+        except BadInput as error:
+            if not (patient and self.path.is_file()):
+                raise
+            self._open_provisionally(StoreUnavailable(str(error)))
 
     def _open(self) -> None:
         """Connect to the file; create its tables, or convert an older version."""
@@ -154,35 +176,65 @@ class Store:
         location = ":memory:" if self._in_memory else self.path
         with self._translated_errors():
             self._connection = sqlite3.connect(location, timeout=BUSY_S, isolation_level=None)
-            version = self._connection.execute("PRAGMA user_version").fetchone()[0]
-            if version == 0:
-                self._connection.execute("PRAGMA auto_vacuum = INCREMENTAL")
-            self._connection.execute("PRAGMA journal_mode = WAL")
-            self._connection.execute("PRAGMA foreign_keys = ON")
-            if version == 0:
-                self._create()
-            elif version in (1, 2, 3):
-                self._migrate()
-            elif version != VERSION:
-                raise UnreadableFile(
-                    f"{self.path} is a store of version {version}, this asperity writes {VERSION}; "
-                    "update asperity, or choose another store"
-                )
+            try:
+                self._prepare()
+            except BaseException:
+                self._connection.close()
+                raise
         self._file = None if self._in_memory else _file_number(self.path)
+        self._unavailable = None
+
+    def _prepare(self) -> None:
+        """Create the tables of a new file, or convert an older version."""
+        version = self._connection.execute("PRAGMA user_version").fetchone()[0]
+        if version == 0:
+            self._connection.execute("PRAGMA auto_vacuum = INCREMENTAL")
+        self._connection.execute("PRAGMA journal_mode = WAL")
+        self._connection.execute("PRAGMA foreign_keys = ON")
+        if version == 0:
+            self._create()
+        elif version in (1, 2, 3):
+            self._migrate()
+        elif version != VERSION:
+            raise UnreadableFile(
+                f"{self.path} is a store of version {version}, this asperity writes {VERSION}; "
+                "update asperity, or choose another store"
+            )
+
+    def _open_provisionally(self, error: StoreUnavailable) -> None:
+        """Read the file without writing, or use an empty store in memory."""
+        self._unavailable, self._file = error, None
+        log = self.path.with_name(f"{self.path.name}-wal")
+        # without a write-ahead log, SQLite can read a file whose folder cannot be written
+        unchanging = not log.is_file() or log.stat().st_size == 0
+        location = f"{self.path.absolute().as_uri()}?mode=ro{'&immutable=1' * unchanging}"
+        try:
+            with self._translated_errors():
+                self._connection = sqlite3.connect(location, uri=True, isolation_level=None)
+                ((version,),) = self._connection.execute("PRAGMA user_version").fetchall()
+            if version == VERSION:
+                return
+            self._connection.close()
+        except (StoreUnavailable, UnreadableFile):
+            pass
+        self._connection = sqlite3.connect(":memory:", isolation_level=None)
+        self._create()
 
     def close(self) -> None:
         """Close the store and merge the write-ahead log into the file."""
         self._connection.close()
 
     def require_present(self) -> None:
-        """Raise StoreUnavailable if the file was removed or replaced since it was opened."""
+        """Raise StoreUnavailable if the file is not open for writing, was removed or replaced."""
+        if self._unavailable is not None:
+            raise self._unavailable
         if not self._in_memory and _file_number(self.path) != self._file:
             raise StoreUnavailable(
                 f"{self.path} was removed or replaced; restore it, or its folder {self.path.parent}"
             )
 
     def recover(self) -> None:
-        """Connect again if the file was removed or replaced.
+        """Connect again if the file was removed or replaced, or could not be used before.
 
         A file missing in its folder is restored from the open connection. A missing folder is made
         again after `MISSING_S`, because it may be moved back or mounted before.
@@ -192,7 +244,7 @@ class Store:
         StoreUnavailable
             if the folder is missing, or the file cannot be written.
         """
-        if _file_number(self.path) == self._file:
+        if self._unavailable is None and _file_number(self.path) == self._file:
             self._missing_since = None
             return
         folder = self.path.parent
@@ -326,6 +378,13 @@ class Store:
 
     def register_sensor(self, address: SensorAddress, settings: Table) -> tuple[int, JsonObject]:
         """Return number and settings of a sensor; a new sensor gets the settings given."""
+        query = (
+            "SELECT sensor.id, settings FROM sensor JOIN point ON point.id = sensor.point "
+            "JOIN machine ON machine.id = point.machine "
+            "WHERE machine.name = ? AND point.name = ? AND sensor.name = ?"
+        )
+        for number, stored in self.read(query, *address):  # also of a store that is read only
+            return number, json.loads(stored)
         with self.transaction() as run:
             run("INSERT OR IGNORE INTO machine (name) VALUES (?)", (address.machine,))
             (machine,) = run("SELECT id FROM machine WHERE name = ?", (address.machine,)).fetchone()

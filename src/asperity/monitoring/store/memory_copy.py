@@ -65,7 +65,21 @@ class MemoryCopy:
         self._last = _last_numbers(self.sensors.store, added_numbers)  # merged only once
 
     def _merge_sensor(self, run: Run, sensor: Sensor, number: int) -> None:
-        """Add what the copy of a sensor has and the store lacks."""
+        """Add what the copy of a sensor has and the store lacks.
+
+        A copy that began without the recordings of the store adds only its notifications; its
+        files are read again and judged with those of the store.
+        """
+        query = "SELECT count(*) FROM recording WHERE sensor = ?"
+        ((stored,),) = run(query, (number,)).fetchall()
+        if stored and not self._last["recording"]:
+            self._add_rows(run, sensor, number, ("call",))
+            return
+        self._replace_memories(run, sensor, number)
+        self._add_rows(run, sensor, number, (*self._last,))
+
+    def _replace_memories(self, run: Run, sensor: Sensor, number: int) -> None:
+        """Replace settings and memories of a sensor in the store."""
         memory = self.sensors.store
         rows = memory.read("SELECT settings, since FROM sensor WHERE id = ?", sensor.number)
         run("UPDATE sensor SET settings = ?, since = ? WHERE id = ?", (*rows[0], number))
@@ -76,11 +90,15 @@ class MemoryCopy:
         run("DELETE FROM levels WHERE sensor = ?", (number,))
         for (body,) in memory.read("SELECT body FROM levels WHERE sensor = ?", sensor.number):
             run("INSERT INTO levels VALUES (?, ?)", (number, body))
-        for table, last in self._last.items():
+
+    def _add_rows(self, run: Run, sensor: Sensor, number: int, tables: Sequence[str]) -> None:
+        """Add new rows of a sensor in some tables, and attempts to notify."""
+        memory = self.sensors.store
+        for table in tables:
             columns = [name for name in _columns(memory, table) if name not in ("id", "sensor")]
             new = memory.read(
                 f"SELECT {', '.join(columns)} FROM {table} WHERE sensor = ? AND id > ? ORDER BY id",
-                *(sensor.number, last),
+                *(sensor.number, self._last[table]),
             )
             statement = (
                 f"INSERT OR IGNORE INTO {table} (sensor, {', '.join(columns)}) "

@@ -31,7 +31,8 @@ class FolderWatch:
 
     Parameters
     ----------
-    state : of the folder
+    state : of the folder; with sensors in memory as long as the store cannot be written
+    store : of its sensors
     folder, table_file, progress : as `watch_folder`
     reopen : returns the sensors of a store anew
     """
@@ -39,16 +40,18 @@ class FolderWatch:
     def __init__(
         self,
         state: WatchState,
+        store: Store,
         folder: Path,
         table_file: str | Path | None,
         progress: Callable[[Reading], None] | None,
         reopen: Callable[[Store], Sensors],
     ) -> None:
-        self.state, self.folder, self.table_file = state, folder, table_file
+        self.state, self.store, self.folder, self.table_file = state, store, folder, table_file
         self.progress, self.reopen = progress, reopen
-        self.store = state.sensors.store
         self.troubles = state.troubles
         self._copy: MemoryCopy | None = None
+        if state.sensors.store is not store:
+            self._continue_in_memory()
         self._lost = folder  # the folder, or the first of its ancestors that was missing
         self._delay = RetryDelay(state.watching.poll_interval_s)
         self._first, self._unjudged, self._overdue = True, False, ""
@@ -143,7 +146,8 @@ class FolderWatch:
             return
         try:
             self._merge_copy()
-        except (AsperityError, OSError):
+        except (AsperityError, OSError) as error:
+            self._state_unavailable(error)
             return
         self._unjudged = True
         self.troubles.end(STORE, f"{self.store.path} is written again; nothing was lost")
@@ -159,19 +163,27 @@ class FolderWatch:
         self.state.sensors.store.close()
         self.state.sensors, self._copy = sensors, None
 
+    def _state_unavailable(self, error: Exception) -> None:
+        """State, once, that the store cannot be used."""
+        self.troubles.begin(
+            STORE,
+            f"{failure_reason(error)}; the watch continues in memory and writes it later",
+        )
+
+    def _continue_in_memory(self) -> None:
+        """Continue with a copy of the sensors in memory."""
+        self._copy = MemoryCopy(self.state.sensors)
+        self.state.sensors = self._copy.sensors
+
     def _check_in_memory(self, error: StoreUnavailable) -> Update | None:
         """Check the folder on a copy in memory, as the store cannot be used."""
         if self.state.watching.once:
             raise error
         self._unjudged = True
-        self.troubles.begin(
-            STORE,
-            f"{failure_reason(error)}; the watch continues in memory and writes it later",
-        )
+        self._state_unavailable(error)
         try:
             if self._copy is None:
-                self._copy = MemoryCopy(self.state.sensors)
-                self.state.sensors = self._copy.sensors
+                self._continue_in_memory()
             update = self._check()
         except Exception as failure:  # noqa: BLE001 (a watch continues)
             self._record_failure(failure)
