@@ -50,6 +50,7 @@ LAST = "last"
 KURTOSIS = "kurtosis"
 CRF = "CRF"
 RMS = "the level (rms)"
+ENVELOPE = "the envelope at"  # before the name of a fault frequency
 MAX_RESIDUAL = 0.4  # of the least change, that a warm-up may leave unexplained
 
 
@@ -307,7 +308,7 @@ def _levels_on_sensor(
         "velocity (rms)": lambda reading: reading.velocity,
     }
     lines = _named_getters(readings, "lines", "the line at")
-    depths = _named_getters(readings, "depths", "the envelope at")
+    depths = _named_getters(readings, "depths", ENVELOPE)
     levels |= _named_getters(readings, "bands", "the level") | lines
     level_conditions, pulse_conditions = (
         _conditions(tracked, exponents, response) for exponents in (LEVEL, PULSES)
@@ -326,6 +327,7 @@ def _levels_on_sensor(
             gain_dependent=label not in depths and label != KURTOSIS,
             step_alarms=label in depths,
             sensor=sensor if several else "",
+            fault_frequency=label.removeprefix(f"{ENVELOPE} ") if label in depths else "",
             conditions=pulse_conditions
             if label in depths or label in lines or label == KURTOSIS
             else level_conditions,

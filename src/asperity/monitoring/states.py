@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from itertools import pairwise
 from statistics import median
+from typing import cast
 
 import numpy as np
 
@@ -29,6 +30,22 @@ STANDARD_ERRORS = 4.0  # that an exponent is away from 0
 MIN_INTERVALS = 8  # intervals between arrivals from which the usual one is known
 OVERDUE_FACTOR = 5.0  # usual intervals without a recording until it is overdue
 MIN_WAIT_S = 60.0
+RISEN = 2.0  # factor over its baseline from which the depth of an envelope names a fault
+COMPONENTS = {
+    "BPFO": "outer race",
+    "BPFI": "inner race",
+    "BSF": "rolling elements",
+    "FTF": "cage",
+}  # by fault frequency
+CRF_SOURCES = frozenset(("CRF", "crf", "both"))
+RISING_CRF = (
+    "In an oil-lubricated contact a rising CRF means a larger load share of the asperities; in a "
+    "dry contact CRF falls with wear."
+)
+FALLING_CRF = (
+    "In an oil-lubricated contact a falling CRF means a smaller load share of the asperities, such "
+    "as by running-in, a thicker film or a lower load; in a dry contact it is a sign of wear."
+)
 SILENCE, ZONE = "silence", "zone"  # `raised_by` of a state: overdue recordings, ISO 20816-3
 # sources of an alert or alarm of the contact: indicators, stages, forecast
 CONTACT_SOURCES = frozenset(("CRF", "damping", "crf", "both", FORECAST))
@@ -62,6 +79,67 @@ def level_state(alarm: Alarm, recordings: Sequence[TrackedRecording]) -> JsonObj
         "factor": finite_or_none(level.factor),
         "reason": reason,
     }
+
+
+def fault_state(alarm: Alarm) -> JsonObject | None:
+    """Return the fault that an alert or alarm indicates, by the depths of the envelope.
+
+    None without an alert or alarm of a level, or without fault frequencies. The `component` is None
+    where no depth has risen.
+    """
+    depths = alarm.level.depths
+    raised = {alarm.raised_by, alarm.raised_since} - {*CONTACT_SOURCES, SILENCE, ""}
+    if not depths or alarm.state not in ("alert", "alarm") or not raised:
+        return None
+    highest, *others = depths
+    risen = highest.factor >= RISEN
+    name = highest.fault_frequency
+    return {
+        "component": _component(name) if risen else None,
+        "fault_frequency": name,
+        "sensor": highest.sensor or None,
+        "depth": highest.depth,
+        "factor": highest.factor,
+        "others": {
+            depth.fault_frequency: depth.factor
+            for depth in others
+            if depth.sensor == highest.sensor
+        },
+    }
+
+
+def _component(fault_frequency: str) -> str:
+    """Return the component of a fault frequency, such as "BPFO" or "BPFO drive end"."""
+    kind = fault_frequency.partition(" ")[0].upper()
+    return COMPONENTS.get(kind, f"component of {fault_frequency}")
+
+
+def fault_sentence(fault: JsonObject | None) -> str:
+    """Return the fault and its evidence in a sentence; "" without one."""
+    if fault is None:
+        return ""
+    name, factor = fault["fault_frequency"], f"{fault['factor']:.2g} times its baseline"
+    others = cast("dict[str, float]", fault["others"])
+    if fault["component"] is None:
+        return f"No fault frequency has risen: the envelope at {name}, the highest, is {factor}."
+    on = f" on {fault['sensor']}" if fault["sensor"] else ""
+    beside = ", ".join(f"{other} {by:.2g}" for other, by in others.items())
+    compared = f"; {beside} times theirs" if beside else ""
+    return (
+        f"Indicates a fault of the {fault['component']}: the envelope at {name}{on} has a depth of "
+        f"{fault['depth']:.2g}, {factor}{compared}."
+    )
+
+
+def crf_meaning(alarm: Alarm, recordings: Sequence[TrackedRecording]) -> str:
+    """Return what the change of CRF behind an alert or alarm means; "" without one."""
+    crf = [recording.crf_reference_hz for recording in recordings]
+    found = [value for value in crf if np.isfinite(value)]
+    raised = {alarm.raised_by, alarm.raised_since} & CRF_SOURCES
+    if not raised or alarm.state not in ("alert", "alarm") or not found:
+        return ""
+    risen = median(found[-UNSEEN:]) > median(found[:FEWEST_CHANGES])
+    return RISING_CRF if risen else FALLING_CRF
 
 
 def causes(

@@ -24,6 +24,9 @@ from asperity.monitoring.states import (
     SILENCE,
     causes,
     contact_state,
+    crf_meaning,
+    fault_sentence,
+    fault_state,
     level_state,
     sensor_state,
 )
@@ -137,6 +140,10 @@ class Track:
         )
         return f"{self._judgement()}{forecast}"
 
+    def fault_sentence(self) -> str:
+        """Return the fault that an alert or alarm indicates, with its evidence; "" without one."""
+        return fault_sentence(fault_state(self.alarm))
+
     def _judgement(self) -> str:
         total = len(self.recordings)
         recordings = f"{total} recordings" if total != 1 else "1 recording"
@@ -148,6 +155,8 @@ class Track:
             )
         finding = " ".join(filter(None, [finding, sensor_summary(self.recordings)]))
         alarm = self.alarm
+        meaning = crf_meaning(alarm, self.recordings)
+        finding = " ".join(filter(None, [self.fault_sentence(), meaning, finding]))
         if alarm.explained:
             finding = f"{finding} {alarm.explained[0].upper()}{alarm.explained[1:]}."
         if alarm.state == "alarm":
@@ -213,6 +222,7 @@ class Track:
             "contact": contact_state(self.recordings, self.evidence),
             "level": level_state(self.alarm, self.recordings),
             "sensor": sensor_state(self.alarm, self.recordings, self.silence_reason),
+            "fault": fault_state(self.alarm),
             "forecast": None if self.forecast is None else self.forecast.scalars(),
             "x": self.x_name,
             "band_hz": list(self.target.band_hz),

@@ -17,6 +17,7 @@ from .comparison import RecordingFacts as RecordingFacts
 from .comparison import asperity_load_share as asperity_load_share
 from .comparison import comparability as comparability
 from .decision import ALERT_RATE_FACTOR as ALERT_RATE_FACTOR
+from .level_monitors import EnvelopeDepth as EnvelopeDepth
 from .level_monitors import LevelJudgement as LevelJudgement
 from .level_monitors import LevelMonitors as LevelMonitors
 from .level_rule import ALARM_FACTOR as ALARM_FACTOR

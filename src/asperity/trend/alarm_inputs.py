@@ -50,6 +50,7 @@ class MonitoredSeries:
     relative : whether `values` are ratios; conditions then act on their logarithm
     sensor : name of the sensor, empty for a single one
     key : identity in the memory of the levels, such as sensor, name and unit; default: the name
+    fault_frequency : name of the fault frequency at which the envelope's depth is measured
     """
 
     name: str
@@ -61,6 +62,7 @@ class MonitoredSeries:
     step_alarms: bool = False
     sensor: str = ""
     key: str = ""
+    fault_frequency: str = ""
     conditions: tuple[Condition, ...] = ()
     relative: bool = False
 

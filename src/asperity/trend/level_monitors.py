@@ -10,17 +10,27 @@ from asperity.trend.level_rule import LevelMonitor, LevelState
 STATES: tuple[LevelState, ...] = ("none", "alert", "alarm")
 
 
+class EnvelopeDepth(NamedTuple):
+    """Present depth of the envelope at a fault frequency, and its factor over the baseline."""
+
+    fault_frequency: str
+    sensor: str
+    depth: float
+    factor: float
+
+
 class LevelJudgement(NamedTuple):
     """Most severe state of all levels after a recording.
 
     `factor` is the highest present level over its baseline, nan if unknown; `name` the level behind
-    the state, or the highest one.
+    the state, or the highest one. `depths` are those of the envelope, the highest factor first.
     """
 
     state: LevelState = "none"
     factor: float = math.nan
     name: str = ""
     reason: str = "no level could be measured"
+    depths: tuple[EnvelopeDepth, ...] = ()
 
 
 class LevelMonitors:
@@ -84,7 +94,17 @@ class LevelMonitors:
             words += f"{math.exp(rise):.2g} times its baseline"
         elif evidence:
             words = f"{words}, {evidence}"
-        return LevelJudgement(state, math.exp(rise), series.name, words)
+        return LevelJudgement(state, math.exp(rise), series.name, words, self._depths())
+
+    def _depths(self) -> tuple[EnvelopeDepth, ...]:
+        """Return the depths of the envelope, the highest factor over the baseline first."""
+        depths = []
+        for series in self._levels:
+            monitor = self._monitors[series.identity]
+            if series.fault_frequency and math.isfinite(monitor.rise):
+                depth, factor = math.exp(monitor.present), math.exp(monitor.rise)
+                depths.append(EnvelopeDepth(series.fault_frequency, series.sensor, depth, factor))
+        return tuple(sorted(depths, key=lambda depth: -depth.factor))
 
     def withhold(self, name: str) -> None:
         """End the finding of a level whose change something else explains."""

@@ -115,11 +115,15 @@ class LevelMonitor:
         return min(self.baseline, self._quantile(0.5))
 
     @property
+    def present(self) -> float:
+        """Median of the present levels; nan before the first."""
+        latest = self.latest[-PRESENT:]
+        return median(level for level, _ in latest) if latest else math.nan
+
+    @property
     def rise(self) -> float:
-        """Median of the present levels less the reference; nan before the first."""
-        if not self.latest:
-            return math.nan
-        return median(level for level, _ in self.latest[-PRESENT:]) - self.reference
+        """Present level less the reference; nan before the first."""
+        return self.present - self.reference
 
     def to_json(self) -> JsonObject:
         """Return the memory for `from_json`."""

@@ -133,6 +133,8 @@ def _actions(track: Track) -> list[tuple[str, str]]:
     alarm = track.alarm
     last = track.recordings[-1]
     rows = [("Finding", capitalised(in_print(alarm.reason)) + ".")]
+    if fault := track.fault_sentence():
+        rows.append(("Fault", fault))
     if alarm.since is not None:
         first = track.recordings[alarm.since]
         when = f", {_when(first)}" if first.reading.started else ""
