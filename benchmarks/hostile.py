@@ -30,6 +30,7 @@ from benchmarks.disturbances import DisturbedWatch, can_mount, schedule
 RATE, SECONDS = 20e3, 0.1
 AHEAD_S = 30 * 86_400.0
 PARTS_S = 3.0  # between the two halves of a file in progress
+MAX_SPACING_S = 5.0  # mean time between arrivals
 HUGE_S = 600.0  # of a huge recording
 HUGE_AT = (0.25, 0.5, 0.75)  # shares of the time at which one arrives
 DISTURBED_SHARE = 0.01  # of the time, during which a disturbance lasts
@@ -198,7 +199,7 @@ def arrivals(
             ends += [] if ending is None else [ending]
         for watched in watches:
             watched.check()
-        sleep(float(rng.uniform(0.2, 1.8)) * 60.0 * minutes / 120.0)
+        sleep(float(rng.uniform(0.2, 1.8)) * min(60.0 * minutes / 120.0, MAX_SPACING_S))
         if number % 10 == 0:
             yield number
     for _, ending in ends:
