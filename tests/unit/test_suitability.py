@@ -71,7 +71,7 @@ def test_a_recording_is_good_for_what_reading_it_provides(tmp_path, name):
         ({"unit": "V"}, "zone", "must be an acceleration or velocity, and is V"),
         ({"unit": "V"}, "level", "relative to recordings of equal gain only (unit: V)"),
         ({"seconds": 2.0}, "zone", "too short: 2 s; velocities from 10 Hz need 3.2 s"),
-        ({"rate_hz": 1000.0}, "zone", "1000 Hz; velocities up to 1000 Hz need 2500 Hz"),
+        ({"rate_hz": 1000.0}, "zone", "1000 Hz; velocities up to 1000 Hz need 2000 Hz"),
         ({"rate_hz": 1000.0}, "contact_resonance", "sampled too slowly: 1000 Hz"),
         ({"scale": 1e-4}, "level", "the machine was off"),
     ],

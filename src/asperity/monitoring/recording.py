@@ -141,7 +141,7 @@ class TrackedRecording:
         if not np.isfinite(velocity):
             return (
                 "velocity not determined: it needs an acceleration or velocity in a known "
-                "unit, sampled at 2.5 kHz or more for 3.2 s or more"
+                "unit, sampled at 2 kHz or more for 3.2 s or more"
             )
         on = f" on {reading.sensor}" if self.on_sensors else ""
         level = f"velocity {quantity('velocity_rms').text(velocity)} rms, 10 to 1000 Hz{on}"

@@ -109,7 +109,7 @@ def _zone(opened: OpenRecording, quality: Quality, target: Target) -> Suitabilit
         return Suitability(
             False,
             f"sampled too slowly: {opened.rate_hz:g} Hz; velocities up to {HIGHEST_HZ:g} Hz need "
-            "2500 Hz",
+            f"{2.0 * HIGHEST_HZ:g} Hz",
         )
     spacing = line_spacing(quality.duration_s, target)
     if spacing > MAX_SPACING_HZ or quality.duration_s * spacing < 1.0:  # a segment
