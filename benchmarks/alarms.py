@@ -213,6 +213,12 @@ def given_season(rng: np.random.Generator) -> Drawn:
     return warmth(rng, 45.0 + rng.uniform(-20.0, 20.0) * NUMBER / RECORDINGS)
 
 
+def season(rng: np.random.Generator) -> Drawn:
+    """Return CRF and level over half a year of oil temperature that is not stated."""
+    phase = np.pi * (NUMBER / RECORDINGS + rng.uniform(-0.5, 0.5))
+    return warmth(rng, 45.0 + rng.uniform(10.0, 20.0) * np.sin(phase))._replace(temperature=None)
+
+
 GIVEN: dict[str, Callable[[np.random.Generator], Drawn]] = {
     "load step, load given": given_step,
     "load step, load given, autocorrelated scatter 0.7": lambda rng: given_step(rng, 0.7),
@@ -234,6 +240,7 @@ WITHOUT_WEAR: dict[str, Callable[[np.random.Generator], Drawn]] = {
     "load step, CRF by 2 to 12 %, not given": load_step,
     "warm-up, CRF by 2 to 12 %": warm_up,
     "moved sensor, level by up to 13 dB": moved_sensor,
+    "half a year of 10 to 20 K, not given": season,
     "drift of modes, 2 %": drift_of_modes,
     "gain change, up to 20 dB": lambda rng: drawn(rng, level=rng.uniform(-2.3, 2.3) * after(rng)),
     "saturating trend, 5 to 30 %": saturating,
@@ -261,6 +268,23 @@ def knee(
     return drawn(rng)._replace(crf=crf, begins=begins)
 
 
+def rounded_knee(rng: np.random.Generator, scatter_hz: float) -> Drawn:
+    """Return the rig's knee, rounded over a fifth of the series."""
+    course, width = knee(rng, scatter_hz), RECORDINGS / 5.0
+    pace = RISE_HZ / course.begins
+    from_knee = np.clip(NUMBER - course.begins, -0.5 * width, 0.5 * width)
+    loss = (1.0 - AFTER) * pace * (from_knee + 0.5 * width) ** 2 / (2.0 * width)
+    sharp = (1.0 - AFTER) * pace * np.clip(NUMBER - course.begins, 0.0, 0.5 * width)
+    return course._replace(crf=course.crf - (loss - sharp) / CRF_HZ * (from_knee < 0.5 * width))
+
+
+def knee_after_run_in(rng: np.random.Generator, scatter_hz: float) -> Drawn:
+    """Return the rig's knee after a run-in, in which CRF falls by 3 to 10 %."""
+    course = knee(rng, scatter_hz)
+    run_in = rng.uniform(0.03, 0.1) * np.exp(-NUMBER / rng.uniform(2.0, 4.0))
+    return course._replace(crf=course.crf + run_in)
+
+
 def knee_under_load(rng: np.random.Generator, scatter_hz: float) -> Drawn:
     """Return the rig's knee under two alternating loads that change CRF by 9 %."""
     course, load = knee(rng, scatter_hz), np.where(rng.random(RECORDINGS) < 0.5, 500.0, 800.0)
@@ -282,6 +306,8 @@ KNEES: dict[str, Callable[[np.random.Generator], Drawn]] = {
     "knee, CRF to 15 Hz": lambda rng: knee(rng, 15.0),
     "knee, CRF to 15 Hz, autocorrelated scatter 0.7": lambda rng: knee(rng, 15.0, 0.7),
     "knee, CRF to 30 Hz": lambda rng: knee(rng, 30.0),
+    "knee, CRF to 15 Hz, rounded over a fifth": lambda rng: rounded_knee(rng, 15.0),
+    "knee, CRF to 15 Hz, after a run-in": lambda rng: knee_after_run_in(rng, 15.0),
     "knee, CRF to 15 Hz, two alternating loads, given": lambda rng: knee_under_load(rng, 15.0),
     "knee, CRF to 15 Hz, a warming season, given": lambda rng: knee_in_season(rng, 15.0),
 }
