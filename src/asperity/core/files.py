@@ -2,9 +2,10 @@
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from platform import python_version
+from stat import S_IMODE
 from typing import TYPE_CHECKING
 
 from asperity.core.errors import AsperityError, BadInput, UnreadableFile
@@ -12,6 +13,7 @@ from asperity.core.errors import AsperityError, BadInput, UnreadableFile
 if TYPE_CHECKING:
     import pandas
 
+MAX_NAME = 50  # characters of a file's name in that of its temporary file
 FORMULAS = ("=", "+", "-", "@", "\t", "\r")  # first characters of a spreadsheet formula
 
 
@@ -19,21 +21,35 @@ FORMULAS = ("=", "+", "-", "@", "\t", "\r")  # first characters of a spreadsheet
 def atomic_write(path: Path) -> Iterator[Path]:
     """Yield a temporary path in the same folder; rename it to `path` on success, else remove it.
 
-    Raises BadInput as `require_writable`, AsperityError if the system cannot write, as on a full
-    disk.
+    An existing file keeps its permissions. Raises BadInput as `require_writable`, AsperityError if
+    the system cannot write, as on a full disk.
     """
     require_writable(path)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        yield part
-        with part.open("rb+") as written:
-            os.fsync(written.fileno())
-        part.replace(path)
+        with new_part(path) as part:
+            yield part
+            with part.open("rb+") as written:
+                os.fsync(written.fileno())
+            part.replace(path)
     except OSError as error:
         reason = error.strerror or error
         raise AsperityError(
             f"{path} could not be written: {reason}; nothing was left behind"
         ) from error
+
+
+@contextmanager
+def new_part(path: Path) -> Iterator[Path]:
+    """Yield a new, empty file beside `path`, with its permissions; remove it if it is still there.
+
+    Its name cannot be foretold, and a link of that name is not followed.
+    """
+    part = path.with_name(f".{path.name[:MAX_NAME]}.{os.urandom(8).hex()}.part")
+    os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+    try:
+        with suppress(FileNotFoundError):
+            part.chmod(S_IMODE(path.stat().st_mode))
+        yield part
     finally:
         part.unlink(missing_ok=True)
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 from asperity.core.documents import JsonObject, Table
 from asperity.core.errors import AsperityError, BadInput, UnreadableFile
-from asperity.core.files import require_writable
+from asperity.core.files import new_part, require_writable
 from asperity.trend import AlarmState
 
 STORE = "asperity.db"
@@ -268,14 +268,10 @@ class Store:
 
     def _restore(self) -> None:
         """Write the content of the open connection to a new file."""
-        part = self.path.with_name(f".{self.path.name}.part")
-        part.unlink(missing_ok=True)
-        try:
-            with self._translated_errors(), closing(sqlite3.connect(part)) as copy:
+        with self._translated_errors(), new_part(self.path) as part:
+            with closing(sqlite3.connect(part)) as copy:
                 self._connection.backup(copy)
             part.replace(self.path)
-        finally:
-            part.unlink(missing_ok=True)
 
     def _create(self) -> None:
         with self.transaction() as run:
