@@ -6,7 +6,7 @@ from typing import TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from asperity.core.errors import BadInput
+from asperity.core.errors import BadInput, shortened
 
 SIGNS = {
     "°C": "write degC for °C",
@@ -14,7 +14,6 @@ SIGNS = {
     "°": "write deg",
     "%": "write a fraction, 0.05 for 5 %",
 }
-MAX_QUOTED = 80  # characters of a value in a message
 
 S = TypeVar("S", bound="Section")
 
@@ -38,8 +37,7 @@ class LocatedError(BadInput):
 
 def quoted(value: object) -> str:
     """Return a value as messages show it: text in quotation marks, long values truncated."""
-    text = f'"{value}"' if isinstance(value, str) else str(value)
-    return text if len(text) <= MAX_QUOTED else f"{text[:MAX_QUOTED]}... ({len(text)} characters)"
+    return shortened(f'"{value}"' if isinstance(value, str) else str(value))
 
 
 def remedy_for(value: object, but: str = "") -> str:
@@ -176,6 +174,6 @@ def _sections_in(annotation: object) -> Iterator[type[Section]]:
 
 
 def _dotted(keys: tuple[str | int, ...]) -> str:
-    return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in keys).removeprefix(
-        "."
-    )
+    return "".join(
+        f"[{key}]" if isinstance(key, int) else f".{shortened(key)}" for key in keys
+    ).removeprefix(".")

@@ -99,6 +99,7 @@ _CUSTOM = {
 # confusing the two would be wrong by a factor of 2 pi
 _FREQUENCIES = {"Hz": "in hertz", "rad/s": "in r/min or rad/s"}
 HUGE = 1e300
+MAX_UNIT = 60  # characters
 WRITTEN_TABLES = "study", "infer"
 TINY = math.ulp(0.0)  # the smallest positive number
 _WRITTEN = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([\w\s.*/^()·⁻-]*)")
@@ -183,6 +184,8 @@ def _convert(number: str, unit_text: str, unit: str | None) -> Decimal:
     target = _common(unit_text if unit is None else unit)
     if source is not None and target is not None and source[0] == target[0]:
         return Decimal(number) * Decimal(source[1]) / (1 if unit is None else Decimal(target[1]))
+    if len(unit_text) > MAX_UNIT:
+        raise _UnusableUnit(f"whose unit is longer than {MAX_UNIT} characters")
     import pint
 
     try:

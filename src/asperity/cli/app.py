@@ -6,7 +6,7 @@ import sys
 import unicodedata
 from collections.abc import Sequence
 from io import TextIOWrapper
-from typing import Annotated
+from typing import Annotated, TextIO
 
 import typer
 
@@ -36,6 +36,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run a command and exit with its code; errors are one line on stderr."""
     tune_memory_use()
     codecs.register_error("plain", _plain)
+    # a daemon may start with closed streams
+    sys.stdout, sys.stderr = sys.stdout or _no_output(), sys.stderr or _no_output()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="plain")
@@ -65,6 +67,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     sys.exit(code)
 
 
+def _no_output() -> TextIO:
+    return open(os.devnull, "w", encoding="utf-8")  # noqa: PTH123
+
+
 def _print_error(sentence: str, code: int) -> int:
     text = printable(sentence)
     print(
@@ -76,7 +82,7 @@ def _print_error(sentence: str, code: int) -> int:
 
 def _output_failed(error: OSError) -> int:
     """Report that standard output could not be written, and discard further output."""
-    sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: PTH123, SIM115 - for exit handlers
+    sys.stdout = _no_output()  # for exit handlers
     if isinstance(error, BrokenPipeError):  # the reader closed the pipe
         return 1
     return _print_error(

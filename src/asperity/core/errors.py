@@ -6,6 +6,8 @@ Each message is one sentence with the quantity, its value and the remedy.
 from collections.abc import Collection
 from typing import Any
 
+MAX_SHOWN = 80  # characters of a key or value in a message
+
 
 class AsperityError(Exception):
     """Base class of all errors that asperity raises on purpose."""
@@ -37,6 +39,18 @@ def with_article(noun: str) -> str:
     ('an oil', 'a lubricant')
     """
     return f"{'an' if noun[:1] in 'aeiou' else 'a'} {noun}"
+
+
+def shortened(text: str, longest: int = MAX_SHOWN) -> str:
+    """Return a text as messages show it, cut after a number of characters.
+
+    Examples
+    --------
+    >>> from asperity.core.errors import shortened
+    >>> shortened("contact", 4)
+    'cont... (7 characters)'
+    """
+    return text if len(text) <= longest else f"{text[:longest]}... ({len(text)} characters)"
 
 
 def require_positive(name: str, value: float, unit: str = "") -> float:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from asperity.core.arrays import Field, Mask
+from asperity.core.arrays import Field, Mask, usual_float_errors
 from asperity.core.errors import BadInput, require_positive
 
 OVERLAP = 0.5  # of successive segments, over their length; a boxcar has none
@@ -87,6 +87,7 @@ class Spectrum:
         return float(self.frequency_hz[1] - self.frequency_hz[0])
 
 
+@usual_float_errors
 def power_spectrum(signal: Signal, *, segment: int | None = None, window: str = "hann") -> Spectrum:
     """Estimate the power spectral density by Welch's method.
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.contact.conditions import ContactConditions
-from asperity.core.arrays import Field
+from asperity.core.arrays import Field, usual_float_errors
 from asperity.core.errors import NotConverged
 from asperity.core.signals import Signal, Spectrum, power_spectrum
 from asperity.coupling.band import band_about, require_sampling, search_band
@@ -127,6 +127,7 @@ def excitation(
     return model.patch(model.excitation(contact), contact)
 
 
+@usual_float_errors
 def contact_vibration(
     state: ContactState,
     conditions: ContactConditions,

@@ -8,7 +8,7 @@ import numpy as np
 
 from asperity.contact.conditions import ContactConditions
 from asperity.contact.grid import Grid
-from asperity.core.arrays import Field
+from asperity.core.arrays import Field, usual_float_errors
 from asperity.core.errors import BadInput, NotConverged
 from asperity.ehl.contact_solution import ContactSolution
 from asperity.ehl.controls import CONTINUATION, SEARCH
@@ -35,6 +35,7 @@ from asperity.surface import Surface
 RIGID = 30.0  # half-widths of the loaded film above which a roller is rejected as rigid
 
 
+@usual_float_errors
 def solve_contact(
     conditions: ContactConditions,
     lubricant: Lubricant | None,

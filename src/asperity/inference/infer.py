@@ -8,7 +8,7 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from asperity.case import Case
-from asperity.core.arrays import Field
+from asperity.core.arrays import Field, usual_float_errors
 from asperity.core.errors import BadInput, require_choice
 from asperity.inference.emulator import Emulator, build_emulator, extend_emulator
 from asperity.inference.forecast import Forecast, Limit, forecast_observations, require_limit
@@ -58,6 +58,7 @@ class InferenceSettings:
     seed: int = 0
 
 
+@usual_float_errors
 def infer_contact(
     recordings: Sequence[str | Path | Observation],
     *,

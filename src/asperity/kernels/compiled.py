@@ -17,9 +17,16 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numba
-from numba.core.caching import FunctionCache, IndexDataCacheFile
-from numba.core.runtime.nrt import rtsys
+from asperity.core.errors import BadInput
+
+try:
+    import numba
+    from numba.core.caching import FunctionCache, IndexDataCacheFile
+    from numba.core.runtime.nrt import rtsys
+except ValueError as error:  # such as NUMBA_NUM_THREADS=0
+    raise BadInput(
+        f"numba cannot be loaded ({error}); correct the environment variables NUMBA_..."
+    ) from None
 
 Kernel = TypeVar("Kernel", bound=Callable[..., object])
 

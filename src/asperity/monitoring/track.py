@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from asperity.case import Case, MachineCase
+from asperity.core.arrays import usual_float_errors
 from asperity.core.errors import BadInput
 from asperity.monitoring.files import RecordingPlace, RecordingTable, read_table, recordings_in
 from asperity.monitoring.forecast import Forecaster
@@ -26,6 +27,7 @@ DEFAULTS = TrackSettings()
 MOST_NAMES = 4  # of folders in a note
 
 
+@usual_float_errors
 def track_recordings(
     paths: Sequence[str | Path],
     settings: TrackSettings = DEFAULTS,

@@ -9,7 +9,7 @@ import tomllib
 from difflib import get_close_matches
 from pathlib import Path
 
-from asperity.core.errors import BadInput
+from asperity.core.errors import BadInput, shortened
 from asperity.recording.reader import parse_time
 from asperity.recording.sensitivity import parse_sensitivity
 
@@ -88,10 +88,10 @@ def _checked(path: Path) -> dict[str, object]:
                 if closest
                 else (f"it may state {', '.join(SIDECAR_KEYS)}")
             )
-            raise BadInput(f"{path.name} has an unknown key {key!r}; {hint}")
+            raise BadInput(f"{path.name} has an unknown key {shortened(repr(key))}; {hint}")
         valid, requirement = _requirement(key, value)
         if not valid:
-            raise BadInput(f"{path.name}: {key} must {requirement}, got {value!r}")
+            raise BadInput(f"{path.name}: {key} must {requirement}, got {shortened(repr(value))}")
     if "started" in stated:
         started = parse_time(stated["started"])
         if started is None:

@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from asperity.core.arrays import Field, Mask
+from asperity.core.arrays import Field, Mask, usual_float_errors
 from asperity.core.errors import BadInput
 from asperity.core.signals import Spectrum, smooth
 from asperity.resonance.band_fit import (
@@ -42,6 +42,7 @@ MAX_MODE_BLOCKS = 600
 AMBIGUOUS_POWER_SHARE = 0.5
 
 
+@usual_float_errors
 def contact_resonance(
     spectrum: Spectrum,
     *,

@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from asperity import ehl
 from asperity.case import Case, load_case
+from asperity.core.arrays import usual_float_errors
 from asperity.core.errors import AsperityError, BadInput, NotConverged, UnreadableFile
 from asperity.core.processes import cores, set_up_worker
 from asperity.core.storage import version_notes
@@ -30,6 +31,7 @@ MIN_PARALLEL_S = 8.0  # work below which starting processes takes longer than it
 SurfaceProgress = Callable[[int, int], None]
 
 
+@usual_float_errors
 def solve_case(
     case: Case,
     *,

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from asperity.core.arrays import Field, Mask
+from asperity.core.arrays import Field, Mask, usual_float_errors
 from asperity.core.errors import AsperityError
 from asperity.ehl import ContactSolution
 from asperity.ehl.linear_solvers.gmres import gmres
@@ -206,6 +206,7 @@ class FlashTemperature:
     heat_2_w: float
 
 
+@usual_float_errors
 def flash_temperature(
     solution: ContactSolution,
     friction_result: Friction | None = None,

@@ -4,7 +4,7 @@ import numpy as np
 
 from asperity.contact.conditions import ContactConditions
 from asperity.contact.grid import Grid
-from asperity.core.arrays import Field, Mask
+from asperity.core.arrays import Field, Mask, usual_float_errors
 from asperity.ehl import (
     ContactError,
     ContactSolution,
@@ -22,6 +22,7 @@ from asperity.kernels.reynolds import LUBRICATED
 from asperity.solution.regime import film_ratio, rms_slope
 
 
+@usual_float_errors
 def contact_state(solution: ContactSolution) -> ContactState:
     """Return the scalars of a solution; residuals are re-evaluated from its fields."""
     return state_of(solution, balance_of(solution))

@@ -14,7 +14,7 @@ import numpy as np
 from asperity.contact.conditions import ContactConditions
 from asperity.contact.grid import MIN_CELLS, Grid
 from asperity.contact.hertz import ellipse_pressure
-from asperity.core.arrays import Field
+from asperity.core.arrays import Field, usual_float_errors
 from asperity.core.errors import BadInput
 from asperity.ehl import ContactSolution
 from asperity.solution.stress_influence import COMPONENTS, Tractions
@@ -139,6 +139,7 @@ class SubsurfaceStress:
         )
 
 
+@usual_float_errors
 def subsurface_stress(
     solution: ContactSolution,
     *,

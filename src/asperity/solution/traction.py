@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from asperity.core.arrays import Field
+from asperity.core.arrays import Field, usual_float_errors
 from asperity.core.errors import BadInput
 from asperity.ehl import ContactSolution
 from asperity.lubricant import EyringShear, NewtonianShear, ShearedFilm, Thermal
@@ -62,6 +62,7 @@ class Friction:
     heat_below: float = 0.0
 
 
+@usual_float_errors
 def friction(
     solution: ContactSolution,
     *,

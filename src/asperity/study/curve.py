@@ -11,7 +11,7 @@ import scipy
 from numpy.typing import ArrayLike
 
 from asperity.case import Case
-from asperity.core.arrays import Field
+from asperity.core.arrays import Field, usual_float_errors
 from asperity.core.coverage import COVERAGE
 from asperity.core.errors import BadInput, require_positive
 from asperity.study.evaluate import BOTH_PRESETS, DONE
@@ -170,6 +170,7 @@ def student_half_width(std: ArrayLike, counts: ArrayLike, level: float = COVERAG
     return np.asarray(quantile * std / np.sqrt(np.maximum(counts, 1)))
 
 
+@usual_float_errors
 def wear_curve(
     case: Case,
     *,

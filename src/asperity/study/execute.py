@@ -26,7 +26,7 @@ from pathlib import Path
 
 import pandas
 
-from asperity.core.arrays import Field
+from asperity.core.arrays import Field, usual_float_errors
 from asperity.core.errors import AsperityError, BadInput, require_positive
 from asperity.core.files import versions
 from asperity.core.processes import cores, set_up_worker
@@ -120,6 +120,7 @@ class StudyResult:
         return load_study_folder(self.folder).maps(case_id)
 
 
+@usual_float_errors
 def run_study(
     plan: StudyPlan,
     *,

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from asperity.core.arrays import real_array
 from asperity.core.errors import UnreadableFile
 from asperity.core.third_party import first_line
 from asperity.surface.raw_map import RawMap, map_of_rows
@@ -75,8 +76,8 @@ def array_map(name: str, heights: "np.ndarray | xarray.DataArray", form: str) ->
             f"{name} holds a {np.ndim(heights)}-dimensional array of type "
             f"{np.asarray(heights).dtype}; give real heights along x and y"
         )
-    if isinstance(heights, np.ndarray):
-        return map_of_rows(np.ma.filled(np.ma.asarray(heights, dtype=np.float64), np.nan), form)
+    if isinstance(heights, np.ndarray) or not hasattr(heights, "dims"):  # not of xarray
+        return map_of_rows(real_array(name, heights).astype(np.float64), form)
     if {str(dim).lower() for dim in heights.dims} == {"x", "y"}:
         ordered = sorted(heights.dims, key=lambda dim: str(dim).lower())
         return _named_map(name, heights.transpose(*ordered), form)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from asperity.core.arrays import Field
+from asperity.core.arrays import Field, real_array
 
 _POINTS = 10_001  # of the curve
 _SECANT = 0.4  # share of the surface spanned by the flattest secant
@@ -51,6 +51,7 @@ def bearing_curve(heights: Field) -> BearingCurve:
     >>> f"{np.interp(0.2, curve.share, curve.height) * 1e6:.2f} um at 20 % of the area"
     '0.83 um at 20 % of the area'
     """
+    heights = real_array("heights", heights)
     finite = heights[np.isfinite(heights)]
     share = np.linspace(0.0, 1.0, _POINTS)
     ordered = np.sort(finite - finite.mean(), axis=None)  # np.quantile is fifty times slower

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from asperity.contact.grid import Grid
-from asperity.core.arrays import Field
+from asperity.core.arrays import Field, usual_float_errors
 from asperity.core.errors import BadInput, require_positive
 from asperity.surface import johnson
 from asperity.surface.model import Surface, length_text, require_roughness
@@ -21,6 +21,7 @@ from asperity.surface.model import Surface, length_text, require_roughness
 _LARGEST_WAVENUMBER = 9.0
 
 
+@usual_float_errors
 def gaussian_surface(
     grid: Grid,
     *,
@@ -256,6 +257,7 @@ def run_in_surface(
     return Surface.scaled(heights, grid, sq)
 
 
+@usual_float_errors
 def self_affine_surface(
     grid: Grid, *, sq: float, hurst: float, cutoffs: tuple[float, float], rng: np.random.Generator
 ) -> Surface:

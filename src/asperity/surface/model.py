@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from asperity.contact.grid import Grid
-from asperity.core.arrays import Field
+from asperity.core.arrays import Field, real_array
 from asperity.core.errors import BadInput, require_positive
 
 UNKNOWN_LENGTH = "unknown"  # as text, of a length that is not finite
+MAX_HEIGHT = 1e3  # m
 MIN_SQ = 1e-15  # m, the size of an atomic nucleus
 
 
@@ -22,6 +23,26 @@ def require_roughness(sq: float) -> float:
     return sq
 
 
+def _heights(name: str, values: Field) -> Field:
+    """Return heights [m], nan where they are missing; raise BadInput for numbers that are none."""
+    heights = real_array(name, values)
+    highest = float(np.max(np.abs(heights), initial=0.0, where=np.isfinite(heights)))
+    if highest > MAX_HEIGHT:
+        raise BadInput(
+            f"{name} must be heights of at most {MAX_HEIGHT:g} m, got {highest:.3g} m; convert "
+            "them to metres"
+        )
+    return heights
+
+
+def _require_finite(heights: Field) -> None:
+    missing = int(np.count_nonzero(~np.isfinite(heights)))
+    if missing:
+        raise BadInput(
+            f"surface has {missing} heights that are missing or not finite; fill or crop them first"
+        )
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Surface:
     """Composite roughness: heights [m], shape (nx, ny), x along rolling, positive towards material.
@@ -29,7 +50,8 @@ class Surface:
     Raises
     ------
     BadInput
-        The shape is not the grid's, or a height is not finite.
+        The shape is not the grid's, or a height is missing, not a real number, or over
+        a kilometre.
 
     Examples
     --------
@@ -46,22 +68,28 @@ class Surface:
     grid: Grid
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "heights", _heights("heights", self.heights))
         if self.heights.shape != self.grid.cells:
             raise BadInput(
                 f"heights must have the grid's shape {self.grid.cells}, got {self.heights.shape}; "
                 "resample them onto the grid"
             )
-        missing = int(np.count_nonzero(~np.isfinite(self.heights)))
-        if missing:
-            raise BadInput(
-                f"surface has {missing} heights that are not finite; fill or crop them first"
-            )
+        _require_finite(self.heights)
 
     @classmethod
     def scaled(cls, heights: Field, grid: Grid, sq: float) -> "Surface":
         """Remove the mean of heights and scale them to `sq` [m]."""
+        heights = real_array("heights", heights)
+        _require_finite(heights)
         heights = np.ascontiguousarray(heights - heights.mean())
-        return cls(heights * (require_roughness(sq) / np.std(heights)), grid)
+        with np.errstate(over="ignore"):
+            spread = float(np.std(heights))
+        if not 0.0 < spread < math.inf:
+            raise BadInput(
+                "heights must differ by finite amounts to be scaled to sq, got a standard "
+                f"deviation of {spread:g}; correct them"
+            )
+        return cls(heights * (require_roughness(sq) / spread), grid)
 
     @property
     def sq(self) -> float:
@@ -82,7 +110,7 @@ class MeasuredSurface:
     Raises
     ------
     BadInput
-        The shape is not the grid's, or no height is valid.
+        The shape is not the grid's, no height is valid, or they are not real numbers below 1 km.
     """
 
     heights: Field
@@ -94,6 +122,7 @@ class MeasuredSurface:
     rolling_along: str = "x"
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "heights", _heights(self.name, self.heights))
         if self.heights.shape != self.grid.cells:
             raise BadInput(
                 f"{self.name} must have its grid's shape {self.grid.cells}, got "

@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 
 from asperity.contact.grid import Grid
-from asperity.core.arrays import Field
+from asperity.core.arrays import Field, usual_float_errors
 from asperity.core.documents import JsonObject
 from asperity.core.quantities import Quantity, catalogue
 from asperity.surface.bearing import bearing_curve, core_heights
@@ -197,6 +197,7 @@ def height_parameters(surface: Surface | MeasuredSurface) -> HeightParameters:
     )
 
 
+@usual_float_errors
 def surface_parameters(surface: Surface | MeasuredSurface) -> SurfaceParameters:
     """Compute the ISO 25178-2 parameters; remove the form of a measured surface first (`level`).
 

@@ -12,7 +12,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.core.arrays import Field
+from asperity.core.arrays import Field, usual_float_errors
 from asperity.core.coverage import QUANTILES
 from asperity.core.errors import BadInput, require_choice
 from asperity.trend.change_points import (
@@ -104,6 +104,7 @@ class Stages:
         return self.kind in ("severe", "steepening", "running-in")
 
 
+@usual_float_errors
 def split_stages(
     x: ArrayLike,
     crf_hz: ArrayLike,

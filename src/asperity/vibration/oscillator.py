@@ -12,7 +12,7 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 import scipy
 
-from asperity.core.arrays import Field, Mask
+from asperity.core.arrays import Field, Mask, usual_float_errors
 from asperity.core.errors import BadInput, require_choice, require_positive
 from asperity.core.signals import Signal, Spectrum, recursion
 
@@ -156,6 +156,7 @@ class MassMotion:
         return float(1.0 - np.mean(self.in_contact))
 
 
+@usual_float_errors
 def acceleration(
     oscillator: ContactOscillator,
     profile: Signal,

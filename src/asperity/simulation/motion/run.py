@@ -9,6 +9,7 @@ from typing import NamedTuple
 from threadpoolctl import threadpool_limits
 
 from asperity.case import Case
+from asperity.core.arrays import usual_float_errors
 from asperity.core.errors import BadInput, NotConverged
 from asperity.core.limits import require_affordable
 from asperity.simulation.motion.history import History, steps_a_pass
@@ -34,6 +35,7 @@ class HistoryProgress(NamedTuple):
     row: Row
 
 
+@usual_float_errors
 def run_history(
     case: Case,
     *,

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from asperity.case import Case
+from asperity.core.arrays import usual_float_errors
 from asperity.core.errors import AsperityError, BadInput, NotConverged, require_positive
 from asperity.core.limits import require_affordable
 from asperity.simulation.wear.contact import (
@@ -39,6 +40,7 @@ class WearProgress(NamedTuple):
     row: Row
 
 
+@usual_float_errors
 def run_wear(
     case: Case,
     *,
