@@ -5,6 +5,7 @@ The pages are first staged in one tree with the README, the changelog and the re
 is fetched.
 """
 
+import csv
 import os
 import re
 import shutil
@@ -31,6 +32,18 @@ LINK = re.compile(r"(!?\[[^\]]*\]\()([^)\s]+)(\))")
 TABLE = re.compile(r"^(:file: )(\S+)()$", re.MULTILINE)  # of a csv-table
 ERRORS = STAGE / "images" / "benchmark-error.png"  # drawn from the csv of the last `make bench`
 MATHJAX = ("sphinx-mathjax-offline", "tex-svg.js")  # package, and its file that draws equations
+# pages for developers, which the site's search leaves out
+FOR_DEVELOPERS = (
+    "architecture",
+    "benchmarks",
+    "changelog",
+    "contributing",
+    "decisions",
+    "security",
+    "validation",
+)
+TERMS = DOCS / "search-terms.csv"  # terms by page, for its search
+COMMENT = re.compile(r"^<!-- not run: .* -->\n", re.MULTILINE)
 REST = "<!-- the rest -->"  # replaced by the pages that no other list of pages names
 
 
@@ -87,13 +100,40 @@ def listed(texts: dict[Path, str]) -> set[str]:
     }
 
 
+def searchable(path: Path, text: str, terms: dict[str, list[str]]) -> str:
+    """Return a staged page with its search terms; pages for developers are not searched."""
+    page = path.relative_to(STAGE).with_suffix("").as_posix()
+    if page in FOR_DEVELOPERS or page.startswith("project/"):
+        return f"---\nnosearch: true\n---\n\n{text}"
+    if page not in terms:
+        return text
+    title, line_end, rest = COMMENT.sub("", text).partition("\n")  # a term needs a target below
+    entries = "\n".join(f"```{{index}} ! single: {term}\n```" for term in terms.pop(page))
+    return f"{title}{line_end}\n{entries}\n{rest}"
+
+
+def search_terms() -> dict[str, list[str]]:
+    """Return the terms of each page."""
+    terms: dict[str, list[str]] = {}
+    with TERMS.open(encoding="utf-8", newline="") as file:
+        for row in csv.DictReader(file):
+            terms.setdefault(row["page"], []).append(row["term"])
+    return terms
+
+
 def stage() -> None:
     """Update the stage; unchanged files keep their time, so that only changed ones are rebuilt."""
     texts = {staged(path): relinked(path) for path in sources() if path.suffix == ".md"}
     texts |= {STAGE / name: text for name, text in make_reference.pages().items()}
     rest = sorted(path.stem for path in texts if path.parent == STAGE and path.stem != "index")
     names = "\n".join(f"../{name}" for name in rest if name not in listed(texts))
-    contents = {path: text.replace(REST, names).encode() for path, text in texts.items()}
+    terms = search_terms()
+    contents = {
+        path: searchable(path, text.replace(REST, names), terms).encode()
+        for path, text in texts.items()
+    }
+    if terms:
+        raise SystemExit(f"{TERMS.name} names pages that do not exist: {', '.join(terms)}")
     contents |= {staged(path): path.read_bytes() for path in sources() if path.suffix != ".md"}
     contents[STAGE / "_static" / "mathjax" / MATHJAX[1]] = mathjax().read_bytes()
     made = [STAGE / name for name in ("gallery", "reference/names")]

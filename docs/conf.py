@@ -42,6 +42,7 @@ mathjax_path = "mathjax/tex-svg.js"  # staged: equations need no network
 mathjax3_config = {"options": {"enableMenu": False}}  # the menu loads speech rules from the network
 copybutton_prompt_text = "$ "
 
+html_search_scorer = str(Path(__file__).parent / "search_scorer.js")
 html_theme = "pydata_sphinx_theme"
 html_title = "asperity"
 html_static_path = ["_static"]

@@ -9,7 +9,7 @@ import re
 from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
-from urllib.parse import unquote, urlsplit
+from urllib.parse import quote, unquote, urlsplit
 
 import pytest
 
@@ -160,3 +160,86 @@ def test_a_browser_contacts_no_other_host_and_draws_mathematics(site):
     assert [url for url in requests if not url.startswith(("file:", "data:", "blob:"))] == []
     assert errors == []
     assert wide == [], "wider than a phone screen"
+
+
+# Search
+# ---------------------------------------------------------------------------------
+
+FOR_DEVELOPERS = (
+    "architecture",
+    "benchmarks",
+    "changelog",
+    "contributing",
+    "decisions",
+    "project/",
+    "security",
+    "validation",
+)
+SEARCHED = {  # what users type, and the page that answers
+    "my oil is ISO VG 68": "start/faq",
+    "how do I enter bearing 6205": "start/faq",
+    "specific film thickness": "questions/micropitting",
+    "starved lubrication": "questions/starvation",
+    "grease": "questions/starvation",
+    "install windows": "start/install",
+    "licence": "start/install",
+    "not converged": "start/troubleshooting",
+    "sampling rate": "recordings",
+    "export results to csv": "how-to/export",
+    "plot pressure": "how-to/export",
+    "temperature": "theory/friction",
+    "false alarm": "theory/alarms",
+    "python api": "start/faq",
+    "Hamrock Dowson": "theory/grid",
+    "profilometer": "how-to/surface",
+    "friction coefficient": "questions/friction",
+    "pitting life": "questions/life",
+    "how long does it take": "start/faq",
+    "finite line contact": "questions/edges",
+    "dry contact": "case-file",
+    "Reynolds equation": "theory/equations",
+    "JFO": "theory/conserving",
+    "Stribeck curve": "questions/friction",
+    "tutorial": "start/first-hour",
+    "FAQ": "start/faq",
+    "gear": "machines",
+    "wear rate": "how-to/wear",
+    "error bars": "start/reading-a-report",
+    "wind turbine gearbox": "machines",
+}
+UNLISTED = (  # not among the search terms
+    "pressure spike",
+    "roughness of both bodies",
+    "cam follower film",
+    "bearing damage detection",
+    "load carried by asperities",
+    "units of the results",
+    "save a picture",
+    "unfinished study resume",
+    "measured surface tilt",
+    "oil data sheet",
+)
+
+
+def first_hits(page, site: Path, query: str) -> list[str]:
+    """Return the pages that the site's search lists for a query."""
+    page.goto(f"{(site / 'search.html').as_uri()}?q={quote(query)}")
+    page.wait_for_selector("#search-results .search-summary:not(:empty)")
+    page.wait_for_function(
+        "/finished|not match|found/.test(document.querySelector('.search-summary').innerText)"
+    )
+    found = page.eval_on_selector_all(
+        "#search-results li > a", "links => links.map(link => link.getAttribute('href'))"
+    )
+    return [re.split(r"\.html|#|\?", link)[0] for link in found]
+
+
+def test_the_search_answers_users(site):
+    with chromium() as browser:
+        page = browser.new_page()
+        hits = {query: first_hits(page, site, query) for query in (*SEARCHED, *UNLISTED)}
+    assert [query for query, found in hits.items() if not found] == []
+    found = {query: hits[query][0] for query in SEARCHED}
+    assert found == SEARCHED
+    developers = [query for query in hits if hits[query][0].startswith(FOR_DEVELOPERS)]
+    assert developers == []
