@@ -19,12 +19,13 @@ from asperity.cli.options import (
     EmulatorFolder,
     ForecastLimit,
     Method,
+    OpenPage,
     Overrides,
     Page,
     Quiet,
     Rate,
-    SampleSeed,
     Scale,
+    Seed,
     Shaft,
     StandingRoughness,
     SurfaceFile,
@@ -35,6 +36,7 @@ from asperity.cli.options import (
     require_output,
 )
 from asperity.cli.output import Block, columns, progress, show, table, written
+from asperity.cli.terminal.browser import open_page, require_page
 from asperity.core import processes
 from asperity.core.errors import BadInput, require_choice
 from asperity.core.quantities import quantity
@@ -55,7 +57,7 @@ if TYPE_CHECKING:
 
 PathsArgument = Annotated[
     list[Path] | None,
-    typer.Argument(metavar="[FILE...]", help="Recordings, or folders of recordings."),
+    typer.Argument(metavar="FILE", help="Recordings, or folders of recordings."),
 ]
 CaseFileOption = Annotated[
     Path | None,
@@ -104,7 +106,7 @@ def infer(
     forecast: ForecastLimit = None,
     worn: Worn = None,
     design: DesignOption = None,
-    seed: SampleSeed = 0,
+    seed: Seed = 0,
     rate: Rate = None,
     unit: Unit = None,
     channel: Channel = None,
@@ -114,16 +116,18 @@ def infer(
     method: Method = None,
     workers: Workers = None,
     page: Page = None,
+    opened: OpenPage = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Infer the state of a contact from recordings, with intervals, and the next point to run."""
+    """Infer the state of a contact from recordings, with intervals."""
     case_file = _required(
         case_file, paths, sampler=sampler, forecast=forecast, worn=worn, design=design
     )
     setting, surface_notes = _setting(case_file, overrides, surface, snapshot=snapshot)
     limit = _limit(forecast, setting, worn)
     history = None if worn is None else simulation.load_wear(worn)
+    require_page(page, requested=opened)
     require_output(page, ".html", option="--report")
     source = _source(table_file, band, rate, unit, channel, scale, shaft, method)
     count = workers or processes.cores()
@@ -136,6 +140,9 @@ def infer(
     if result.emulator is not initial:
         ahead = forecaster(result.emulator)
     _show(result, ahead, design, page, as_json=as_json, quiet=quiet)
+    open_page(page, requested=opened)
+    if ahead is not None and ahead.alarm:
+        raise typer.Exit(EXIT_CODES["alarm"])
 
 
 def _infer(
@@ -269,7 +276,7 @@ def _show(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Print verdicts and tables, or all as JSON; exit with the alarm's code if there is one."""
+    """Print verdicts and tables, or all as JSON."""
     designed = None
     if design is not None:
         designed = inference.design_contact(result.forward, result.draws.z, clr=design)
@@ -295,8 +302,6 @@ def _show(
         as_json=as_json,
         quiet=quiet,
     )
-    if ahead is not None and ahead.alarm:
-        raise typer.Exit(EXIT_CODES["alarm"])
 
 
 def _posterior(result: "Inference") -> Block:

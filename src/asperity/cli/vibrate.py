@@ -70,7 +70,10 @@ def vibrate(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Run the vibration model alone, dry with all load on asperities, or the paper's Table 1."""
+    """Run the vibration model alone, or the paper's Table 1.
+
+    The contact is dry, with all load on asperities.
+    """
     if path is None and not table1:
         raise BadInput(
             "a case is missing; asperity vibrate CASE.toml, or asperity vibrate --table1"
