@@ -45,7 +45,7 @@ def test_progress_is_shown_on_the_terminal_while_output_is_redirected():
     assert "2 read" in output_text
 
 
-def test_without_a_terminal_lines_state_that_the_work_goes_on(monkeypatch, capsys):
+def test_lines_of_a_log_report_that_the_work_continues(monkeypatch, capsys):
     monkeypatch.setattr(output, "FIRST_LINE_S", 0.05)
     with output.progress("case", "setting up ...", quiet=False) as display:
         sleep(0.1)

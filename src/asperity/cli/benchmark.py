@@ -56,7 +56,7 @@ def benchmark(
         lambda: result.scalars() | {"written": [str(path) for path in saved]},
         _rows(result),
         [f"  left out: {case}: {reason}" for case, reason in result.left_out],
-        written("  Written", *saved) if saved else [],
+        written("Written", *saved) if saved else [],
         as_json=as_json,
         quiet=quiet,
     )

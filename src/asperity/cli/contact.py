@@ -80,35 +80,37 @@ def demo(
         )
 
 
+SurfacesOption = Annotated[
+    int | None,
+    typer.Option(
+        metavar="N",
+        min=1,
+        help="Surfaces to average (default: 5; fine grids: 3), or running tracks "
+        "(default: 1; measured: 3).",
+    ),
+]
+DynamicOption = Annotated[
+    bool, typer.Option("--dynamic", help="Compute frequency-dependent stiffness and damping.")
+]
+RunOption = Annotated[
+    Path | None, typer.Option(metavar="RUN.nc", help="File for the run, with its case.")
+]
+EverythingOption = Annotated[
+    bool, typer.Option("--all", help="Print all quantities and the notes in full.")
+]
+
+
 @app.command()
 def solve(
     path: CaseOrRun,
     surface: SurfaceFile = None,
     overrides: Overrides = None,
-    surfaces: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N",
-            min=1,
-            help="Surfaces to average (default: 5; fine grids: 3), or running tracks "
-            "(default: 1; measured: 3).",
-        ),
-    ] = None,
+    surfaces: SurfacesOption = None,
     accuracy: Accuracy = None,
     snapshot: StandingRoughness = False,
-    dynamic: Annotated[
-        bool,
-        typer.Option(
-            "--dynamic",
-            help="Compute frequency-dependent stiffness and damping.",
-        ),
-    ] = False,
-    out: Annotated[
-        Path | None, typer.Option(metavar="RUN.nc", help="File for the run, with its case.")
-    ] = None,
-    everything: Annotated[
-        bool, typer.Option("--all", help="Print all quantities and the notes in full.")
-    ] = False,
+    dynamic: DynamicOption = False,
+    out: RunOption = None,
+    everything: EverythingOption = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:

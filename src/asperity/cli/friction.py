@@ -1,7 +1,9 @@
 """`asperity stribeck` and `asperity traction`: friction over speed and slide-to-roll ratio."""
 
+import csv
 from collections.abc import Callable
 from dataclasses import asdict
+from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -26,8 +28,6 @@ from asperity.core.errors import AsperityError
 from asperity.core.quantities import quantity
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
-
     from asperity.case import Case
     from asperity.results import FrictionCurve, SolverProgress
 
@@ -113,7 +113,7 @@ def _friction_command(
     for path in figures:
         report.write_figure(report.friction_figure(curves), path)
     for path in tables:
-        files.write_csv(path, _all_points(curves))
+        files.write_text(path, _points_csv(curves))
     verdicts = [drawn.verdict() for drawn in curves]
     hints = {drawn.hint() for drawn in curves} - {None}
     show(
@@ -125,7 +125,7 @@ def _friction_command(
             "tables": [str(path) for path in tables],
         },
         *([f"  note: {hint}"] for hint in hints),
-        written("  Written", *figures, *tables),
+        written("Written", *figures, *tables),
         *(_points(drawn) for drawn in curves),
         as_json=as_json,
         quiet=quiet,
@@ -135,13 +135,14 @@ def _friction_command(
         raise AsperityError(f"not converged at {unfinished} marked points; do not use them")
 
 
-def _all_points(curves: "list[FrictionCurve]") -> "DataFrame":
-    """Return a row per point of all curves, in SI."""
-    import pandas as pd
-
-    return pd.DataFrame(
-        [{"sq_m": curve.sq, **asdict(point)} for curve in curves for point in curve.points]
-    )
+def _points_csv(curves: "list[FrictionCurve]") -> str:
+    """Return a csv row per point of all curves, in SI."""
+    rows = [{"sq_m": curve.sq, **asdict(point)} for curve in curves for point in curve.points]
+    buffer = StringIO()
+    writer = csv.DictWriter(buffer, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return buffer.getvalue()
 
 
 def _points(curve: "FrictionCurve") -> Block:

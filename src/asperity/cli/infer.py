@@ -33,7 +33,6 @@ from asperity.cli.options import (
     Workers,
     Worn,
     chosen_case,
-    require_output,
 )
 from asperity.cli.output import Block, columns, progress, show, table, written
 from asperity.cli.terminal.browser import open_page, require_page
@@ -128,7 +127,6 @@ def infer(
     limit = _limit(forecast, setting, worn)
     history = None if worn is None else simulation.load_wear(worn)
     require_page(page, requested=opened)
-    require_output(page, ".html", option="--report")
     source = _source(table_file, band, rate, unit, channel, scale, shaft, method)
     count = workers or processes.cores()
     observations = _observe(paths, setting, source, count, quiet=quiet)
@@ -139,10 +137,7 @@ def infer(
     result = _infer(setting, initial, latest, sampler, seed, extend, count, quiet=quiet)
     if result.emulator is not initial:
         ahead = forecaster(result.emulator)
-    _show(result, ahead, design, page, as_json=as_json, quiet=quiet)
-    open_page(page, requested=opened)
-    if ahead is not None and ahead.alarm:
-        raise typer.Exit(EXIT_CODES["alarm"])
+    _show(result, ahead, design, page, opened=opened, as_json=as_json, quiet=quiet)
 
 
 def _infer(
@@ -273,10 +268,11 @@ def _show(
     design: float | None,
     page: Path | None,
     *,
+    opened: bool,
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Print verdicts and tables, or all as JSON."""
+    """Print verdicts and tables, or all as JSON; exit with the alarm's code if there is one."""
     designed = None
     if design is not None:
         designed = inference.design_contact(result.forward, result.draws.z, clr=design)
@@ -293,7 +289,7 @@ def _show(
         _points(result),
         _models(result),
         _notes(result),
-        written("report", page),
+        written("Report", page),
     )
     show(
         [*verdicts, result.verdict()],
@@ -302,6 +298,9 @@ def _show(
         as_json=as_json,
         quiet=quiet,
     )
+    open_page(page, requested=opened)
+    if ahead is not None and ahead.alarm:
+        raise typer.Exit(EXIT_CODES["alarm"])
 
 
 def _posterior(result: "Inference") -> Block:

@@ -21,7 +21,7 @@ from asperity.cli.options import (
 )
 from asperity.cli.output import Block, Row, columns, progress, show, table
 from asperity.cli.study import study_progress
-from asperity.cli.terminal.browser import open_page, require_page
+from asperity.cli.terminal.browser import open_page, require_opened
 from asperity.core import files
 from asperity.core.documents import Table
 from asperity.core.errors import AsperityError
@@ -78,7 +78,7 @@ def machine_command(
 ) -> None:
     """Solve every contact of a gear pair, bearing, discs or cam."""
     page = None if out is None or dry_run else out / PAGE
-    require_page(page, requested=opened, option="--out DIR, without --dry-run")
+    require_opened(page, requested=opened, option="--out DIR, without --dry-run")
     chosen = case.load_machine(path, read_overrides(overrides, snapshot=snapshot))
     if dry_run:
         result = machines.machine_conditions(chosen)

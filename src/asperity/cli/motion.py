@@ -19,7 +19,6 @@ from asperity.cli.options import (
     Quiet,
     SurfaceFile,
     chosen_case,
-    require_output,
 )
 from asperity.cli.output import Block, Row, progress, show, table, text, written
 from asperity.cli.terminal.browser import open_page, require_page
@@ -75,7 +74,6 @@ def run(
 ) -> None:
     """Simulate the moving roughness step by step; resumable."""
     require_page(page, requested=opened)
-    require_output(page, ".html", option="--report")
     chosen = chosen_case(path, overrides, surface)
     if steps is not None and passes is not None:
         raise BadInput(

@@ -55,7 +55,7 @@ from asperity.cli.options import (
     require_output,
 )
 from asperity.cli.output import progress
-from asperity.cli.terminal.browser import open_page, require_page
+from asperity.cli.terminal.browser import require_opened
 from asperity.core import files, processes
 from asperity.core.errors import BadInput
 
@@ -170,8 +170,7 @@ def track(
     quiet: Quiet = False,
 ) -> None:
     """Evaluate recordings: wear stage, alarm and forecast."""
-    _require_outputs(out or (), page, store)
-    require_page(page, requested=opened)
+    _require_outputs(out or (), page, store, opened=opened)
     if series is not None:
         track_series(SimpleNamespace(**locals()))
         return
@@ -202,8 +201,7 @@ def track(
             acknowledge=acknowledge,
         )
     saved = write_track(tracked, out or (), page)
-    show_track(tracked, page, saved, store, as_json=as_json, quiet=quiet)
-    open_page(page, requested=opened)
+    show_track(tracked, page, saved, store, opened=opened, as_json=as_json, quiet=quiet)
     end_with(tracked.alarm.state)
 
 
@@ -333,8 +331,11 @@ def _given(paths: list[Path] | None) -> list[Path]:
     return paths
 
 
-def _require_outputs(out: "Sequence[Path]", page: Path | None, store: Path | None) -> None:
-    """Raise BadInput for an output that cannot be written."""
+def _require_outputs(
+    out: "Sequence[Path]", page: Path | None, store: Path | None, *, opened: bool
+) -> None:
+    """Raise BadInput for an output that cannot be written or opened."""
+    require_opened(page, requested=opened)
     for path in (page, store):
         if path is not None:
             files.require_writable(path)

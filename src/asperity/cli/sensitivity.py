@@ -261,7 +261,7 @@ def calibrate(
         _effort(result),
         table(after)
         if after
-        else ["  Nothing is saved; --out DIR saves the calibrated case, tables and figure."],
+        else ["Nothing is saved; --out DIR saves the calibrated case, tables and figure."],
         as_json=as_json,
         quiet=quiet,
     )

@@ -60,7 +60,7 @@ def store(
         )
         if rows
         else [],
-        written("  Written", *exported),
+        written("Written", *exported),
         as_json=as_json,
         quiet=quiet,
     )

@@ -25,7 +25,7 @@ from asperity.cli.options import (
     require_output,
 )
 from asperity.cli.output import Block, columns, progress, show, table, text
-from asperity.cli.terminal.browser import open_page, require_page
+from asperity.cli.terminal.browser import open_page, require_opened
 from asperity.core.errors import AsperityError, BadInput
 from asperity.core.quantities import quantity
 
@@ -88,7 +88,7 @@ def study_command(
     """Sweep quantities of a case, on several surfaces; resumable."""
     part = _shard(shard)
     _require_places(out, page, dry_run=dry_run)
-    require_page(page, requested=opened)
+    require_opened(page, requested=opened)
     if _has_machine(path):
         _refuse_for_machine(page, figures, merge, executor, fields, retry_failed, part != (1, 1))
         replaced = read_overrides(overrides, snapshot=snapshot)

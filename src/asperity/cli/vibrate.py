@@ -116,7 +116,7 @@ def _vibrate(chosen: "Case", figures: Path | None, *, as_json: bool, quiet: bool
         vibrated.verdict(),
         lambda: scalars | {"figures": [str(figure) for figure in drawn]},
         table(rows),
-        written("  Figure", *drawn),
+        written("Figure", *drawn),
         as_json=as_json,
         quiet=quiet,
     )
@@ -145,7 +145,7 @@ def _table1(
             "figures": [str(figure) for figure in drawn],
         },
         _printed_and_ours(rows),
-        written("  Figure", *drawn),
+        written("Figure", *drawn),
         as_json=as_json,
         quiet=quiet,
     )

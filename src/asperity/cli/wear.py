@@ -22,7 +22,6 @@ from asperity.cli.options import (
     Unit,
     Workers,
     chosen_case,
-    require_output,
 )
 from asperity.cli.output import Block, columns, progress, show, span, table, written
 from asperity.cli.terminal.browser import open_page, require_page
@@ -137,7 +136,6 @@ def wear(
             "either pair"
         )
     require_page(page, requested=opened)
-    require_output(page, ".html", option="--report")
     chosen = chosen_case(path, overrides, surface, snapshot=snapshot)
     history = _simulate(chosen, path.name, hours, out, workers or cores(), quiet=quiet)
     if page is not None:
@@ -153,8 +151,8 @@ def _show(history: "WearHistory", page: Path | None, *, as_json: bool, quiet: bo
         _contact(history),
         _bodies(history),
         table([], history.notes),
-        written("saved in", history.folder),
-        written("report", page),
+        written("Saved in", history.folder),
+        written("Report", page),
         as_json=as_json,
         quiet=quiet,
     )

@@ -4,10 +4,19 @@ import sys
 import webbrowser
 from pathlib import Path
 
+from asperity.cli.options import require_output
 from asperity.core.errors import BadInput
 
 
-def require_page(page: Path | None, *, requested: bool, option: str = "--report OUT.html") -> None:
+def require_page(page: Path | None, *, requested: bool) -> None:
+    """Raise BadInput for a page of `--report` that cannot be written or opened."""
+    require_opened(page, requested=requested)
+    require_output(page, ".html", option="--report")
+
+
+def require_opened(
+    page: Path | None, *, requested: bool, option: str = "--report OUT.html"
+) -> None:
     """Raise BadInput if a report that is not written is to be opened."""
     if requested and page is None:
         raise BadInput(f"--open opens the report that is written; add {option}")
