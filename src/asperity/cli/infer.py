@@ -125,7 +125,7 @@ def infer(
     )
     setting, surface_notes = _setting(case_file, overrides, surface, snapshot=snapshot)
     limit = _limit(forecast, setting, worn)
-    history = None if worn is None else simulation.load_wear(worn)
+    history = _history(worn)
     require_page(page, requested=opened)
     source = _source(table_file, band, rate, unit, channel, scale, shaft, method)
     count = workers or processes.cores()
@@ -165,6 +165,11 @@ def _limit(forecast: str | None, setting: "Setting", worn: Path | None) -> "Limi
     limit = inference.read_limit(forecast, setting)
     inference.require_limit(setting, limit, worn=worn is not None)
     return limit
+
+
+def _history(worn: Path | None) -> "WearHistory | None":
+    """Load the wear simulation that is the prior of a forecast, if one is given."""
+    return None if worn is None else simulation.load_wear(worn)
 
 
 def _source(
