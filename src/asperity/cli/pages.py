@@ -7,8 +7,10 @@ import typer
 
 from asperity import paper, report, results, simulation, study
 from asperity.cli.app import app
-from asperity.cli.options import AsJson, Quiet, StudyFigures, require_output
+from asperity.cli.options import AsJson, OpenPage, Quiet, StudyFigures, require_output
 from asperity.cli.output import progress, show, written
+from asperity.cli.terminal.browser import open_page
+from asperity.core import files
 from asperity.core.errors import BadInput
 
 
@@ -17,14 +19,15 @@ def report_command(
     paths: Annotated[
         list[Path],
         typer.Argument(
-            metavar="RUN...|DIR",
+            metavar="RUN|DIR",
             help="Runs saved by asperity solve --out, or the folder of a study, history or wear.",
         ),
     ],
     out: Annotated[
         Path | None,
         typer.Option(
-            metavar="OUT.html", help="Page to write (default: beside the run, or in the folder)."
+            metavar="OUT.html",
+            help="File for the page (default: beside the run, or in the folder).",
         ),
     ] = None,
     figures: StudyFigures = None,
@@ -34,10 +37,11 @@ def report_command(
             metavar="FILE.toml", help="Reference values for a study (default: the paper's)."
         ),
     ] = None,
+    opened: OpenPage = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write a self-contained HTML page of runs, a study, a history or wear."""
+    """Write an HTML page of runs, a study, a history or wear."""
     folders = [path for path in paths if path.is_dir()]
     if folders and len(paths) > 1:
         raise BadInput(
@@ -59,6 +63,7 @@ def report_command(
         _report_history(folders[0], out, as_json=as_json, quiet=quiet)
     else:
         _report_runs(paths, out, as_json=as_json, quiet=quiet)
+    open_page(out, requested=opened)
 
 
 def _kind(folders: list[Path]) -> Literal["runs", "study", "wear", "history"]:
@@ -71,6 +76,8 @@ def _kind(folders: list[Path]) -> Literal["runs", "study", "wear", "history"]:
 
 
 def _report_runs(paths: list[Path], out: Path, *, as_json: bool, quiet: bool) -> None:
+    for path in paths:
+        _require_run(path)
     runs = [results.load_run(path) for path in paths]
     report.write_report(runs, out)
     show(
@@ -80,6 +87,21 @@ def _report_runs(paths: list[Path], out: Path, *, as_json: bool, quiet: bool) ->
         as_json=as_json,
         quiet=quiet,
     )
+
+
+def _require_run(path: Path) -> None:
+    """Raise BadInput for a file that is not a saved run by its ending."""
+    files.require_file(path)
+    if path.suffix == ".toml":
+        raise BadInput(
+            f"{path} is a case, not a saved run; solve it first: "
+            f"asperity solve {path} --out {path.with_suffix('.nc')}"
+        )
+    if path.suffix != ".nc":
+        raise BadInput(
+            f"{path} is not a saved run; name a file RUN.nc of asperity solve --out, or the "
+            "folder of a study, history or wear"
+        )
 
 
 def _report_history(folder: Path, out: Path, *, as_json: bool, quiet: bool) -> None:
