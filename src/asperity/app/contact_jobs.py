@@ -19,7 +19,7 @@ from threadpoolctl import threadpool_limits
 
 from asperity.app.contact_result import ContactResult, coarse_result, result_of_run
 from asperity.app.settings import limit_cells
-from asperity.case import Case
+from asperity.case import Case, MachineCase
 from asperity.contact.grid import Grid
 from asperity.core.errors import AsperityError, BadInput
 from asperity.core.processes import set_up_worker
@@ -31,6 +31,9 @@ from asperity.surface import Surface
 ReportWriter = Callable[
     [Sequence[Run], Path], Path
 ]  # `asperity.report.write_report`, passed in by the command line
+
+MachineDrawer = Callable[[MachineCase], tuple[str, str, str]]
+"""Draws a machine: data URI, alternative text and caption; passed in by the command line."""
 
 COARSE_CELLS = 64 * 64  # largest number of cells of a coarse solution
 COARSEST_CELLS = 32 * 32  # the same, if that one does not converge within its steps
@@ -50,6 +53,14 @@ class JobFailure(NamedTuple):
     """Outcome of a job that failed, with a message for the user."""
 
     message: str
+
+
+class Drawing(NamedTuple):
+    """Drawing of a machine as data URI, with its alternative text and caption."""
+
+    uri: str
+    alt: str
+    caption: str
 
 
 class Ticket(NamedTuple):
@@ -229,6 +240,11 @@ def open_run(path: Path) -> tuple[Case, ContactResult]:
     """Load a stored run; return its case and result."""
     run = load_run(path)
     return run.case, result_of_run(run, run.solution.convergence.seconds)
+
+
+def draw_machine(ticket: Ticket, machine: MachineCase, draw: MachineDrawer) -> Drawing:  # noqa: ARG001
+    """Draw a machine to scale."""
+    return Drawing(*draw(machine))
 
 
 def make_report(ticket: Ticket, case: Case, write: ReportWriter) -> str:

@@ -1,43 +1,69 @@
 """Page of a contact: inputs and results, redrawn whenever the session changes."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 from bokeh.models import Column, UIElement
+from markupsafe import Markup
 
 from asperity.app import export
-from asperity.app.contact_jobs import JobFailure, ReportWriter, make_report, open_surface
+from asperity.app.contact_jobs import (
+    Drawing,
+    JobFailure,
+    MachineDrawer,
+    ReportWriter,
+    draw_machine,
+    make_report,
+    open_surface,
+)
 from asperity.app.contact_result import ContactResult
 from asperity.app.figures import SPECTRUM_HEIGHT, TRIALS_HEIGHT, SpectrumFigure, TrialFigures
 from asperity.app.jobs import JobQueue, WorkerPool
 from asperity.app.map_images import MapImages, placeholder
+from asperity.app.presets import TITLES, preset_case
 from asperity.app.session import ContactSession
-from asperity.app.settings import Settings, surface_key
+from asperity.app.settings import Settings, preset_key, surface_key
 from asperity.app.surface_store import SurfaceStore
 from asperity.app.uploads import FileDrop
 from asperity.app.widgets import (
+    DRAWING,
     DROP,
+    HEADLINE,
     INHERIT,
     LOOK,
     MAP_KEY,
     TILE_STYLES,
     Download,
+    HeadlineStrip,
     InputWidget,
     Layout,
     PageBlock,
     StaleMark,
     button,
     button_row,
+    headline,
     notes,
     sentences,
     text_block,
     tiles,
 )
-from asperity.case import Case
+from asperity.case import Case, MachineCase
 from asperity.core.quantities import quantity
 
 LINK_NOTE = "The link to this page remains valid while the server runs."
 SURFACE_LIMIT = 300_000_000  # bytes of a measured surface
+
+
+class ReportTools(NamedTuple):
+    """Functions of `asperity.report` that the page calls, passed in by the command line.
+
+    `write_report` writes the report of a run, `draw_machine` draws a machine to scale.
+    """
+
+    write_report: ReportWriter
+    draw_machine: MachineDrawer
 
 
 class ContactView:
@@ -46,11 +72,11 @@ class ContactView:
     Parameters
     ----------
     settings : the opened case
-    workshop : runs the jobs
+    worker_pool : runs the jobs
     deliver : calls a function under the document's lock
     set_address : sets the query of the browser's address
-    write_report : writes the report of a run
-    shelf : stores dropped surfaces
+    tools : report of a run and drawing of a machine
+    surfaces : stores dropped surfaces
     """
 
     def __init__(
@@ -59,23 +85,24 @@ class ContactView:
         worker_pool: WorkerPool,
         deliver: Callable[[Callable[[], None]], None],
         set_address: Callable[[str], None],
-        write_report: ReportWriter,
+        tools: ReportTools,
         surfaces: SurfaceStore,
     ) -> None:
         self._surfaces = surfaces
-        self._set_address, self._write_report = set_address, write_report
+        self._set_address, self._tools = set_address, tools
         self._worker_pool, self._deliver = worker_pool, deliver
-        self.session = ContactSession(
-            settings, JobQueue(worker_pool, deliver), self.draw, JobQueue(worker_pool, deliver)
-        )
-        self._side_jobs = JobQueue(worker_pool, deliver)
+        coarse, full = (JobQueue(worker_pool, deliver, solves=True) for _ in range(2))
+        self.session = ContactSession(settings, coarse, self.draw, full)
+        self._side_jobs, self._drawings = (JobQueue(worker_pool, deliver) for _ in range(2))
         self.inputs: dict[str, InputWidget] = {}
-        self._built: Case | None = None
+        self._built: Case | MachineCase | None = None
+        self._sketched: MachineCase | None = None
         self._more = False
         self._drawn: tuple[ContactResult, ContactResult | None] | None = None
         self._create_outputs()
         self._create_controls()
         self._build_knobs()
+        worker_pool.when_warm(lambda: deliver(self.draw))
 
     def _create_outputs(self) -> None:
         """Create texts, and placeholders of the figures."""
@@ -87,6 +114,8 @@ class ContactView:
         self._pending_figures = [*self.maps.steps(), self._make_spectrum, self._make_trials]
         self.status, self.verdict, self.notes, self.message = (text_block() for _ in range(4))
         self.tiles = text_block(TILE_STYLES)
+        self.drawing = text_block(DRAWING)
+        self.strip = HeadlineStrip()
         self.stale_mark = StaleMark(self.status)
         self.download = Download()
 
@@ -104,6 +133,8 @@ class ContactView:
             stylesheets=[LOOK, DROP],
         )
         self.more = button("More inputs", self._show_more)
+        chips = [button(title, partial(self._open_preset, key)) for key, title in TITLES.items()]
+        self.presets = button_row(*chips)
         self.pin = button("Pin to compare", self._pin)
         self.report = button("Report", self._make_report)
         self.buttons = button_row(
@@ -118,6 +149,8 @@ class ContactView:
         if result is not None and not query:
             self.session.open(self.session.settings, result)
             return
+        if (preset := preset_key(query)) in TITLES:
+            self.session.settings = Settings(preset_case(preset), preset=preset)
         key = surface_key(query)
         case = self._surfaces.load(key, self.drop.folder) if key else None
         if case is not None:
@@ -138,6 +171,7 @@ class ContactView:
         self._pending_figures.clear()
         self.session.close()
         self._side_jobs.close()
+        self._drawings.close()
         self.drop.close()
 
     # Results
@@ -148,11 +182,7 @@ class ContactView:
         session = self.session
         if session.settings.opened is not self._built:
             self._build_knobs()
-        loading = (
-            ""
-            if self._worker_pool.is_warm
-            else "Loading the solver (the first time, it is also compiled). "
-        )
+        loading = self._worker_pool.is_compiling
         kind = (
             "alarm"
             if session.problem or (session.result is not None and not session.result.converged)
@@ -164,19 +194,53 @@ class ContactView:
             widget.show(
                 rejected.text if rejected else session.settings.text(key),
                 rejected.message if rejected else "",
+                "" if rejected else session.settings.remark(key),
             )
         self.stale_mark.show(session.stale)
+        self._draw_machine()
+        self._draw_strip(loading=loading)
         if session.result is not None:
             self.tiles.text = tiles(
-                session.result.tiles, session.result, session.pinned, stale=session.pending
+                [tile for tile in session.result.tiles if tile.key not in HEADLINE],
+                session.result,
+                session.pinned,
+                stale=session.stale,
             )
             if (session.result, session.pinned) != self._drawn:
                 self._draw_result(session.result, session.pinned)
                 self._drawn = (session.result, session.pinned)
         self.pin.label = "Unpin" if session.pinned is not None else "Pin to compare"
+        notice = "Loading the solver (the first time, it is also compiled). " if loading else ""
         self.status.text = sentences(
-            [f"{loading}{status}"], kind
+            [f"{notice}{status}"], kind
         )  # last: a screen reader announces it when the page is complete
+
+    def _draw_strip(self, *, loading: bool) -> None:
+        """Draw regime, load share and resonance, which stay visible."""
+        session = self.session
+        html = self.strip.html
+        if session.result is not None:
+            html = headline(
+                session.result, session.pinned, state=session.state, stale=session.stale
+            )
+        self.strip.show(html, busy=loading)
+
+    def _draw_machine(self) -> None:
+        """Draw the machine when it has changed."""
+        machine = self.session.settings.machine
+        if machine is self._sketched:
+            return
+        self._sketched = machine
+        if machine is None:
+            self.drawing.text = ""
+            return
+        self._drawings.submit(
+            (draw_machine, (machine, self._tools.draw_machine)), self._machine_drawn
+        )
+
+    def _machine_drawn(self, result: object) -> None:
+        if isinstance(result, Drawing) and self._sketched is not None:
+            self.drawing.text = Markup('<img src="{}" alt="{}"><p>{}</p>').format(*result)
 
     def _draw_result(self, result: ContactResult, pinned: ContactResult | None) -> None:
         self.maps.show(result, pinned)
@@ -249,6 +313,11 @@ class ContactView:
         self._build_knobs()
         self.draw()
 
+    def _open_preset(self, name: str) -> None:
+        """Open a preset case."""
+        self._show_message()
+        self.session.open(Settings(preset_case(name), preset=name))
+
     def _restore(self, number: int) -> None:
         """Restore the settings of an earlier result."""
         self._show_message()
@@ -289,7 +358,7 @@ class ContactView:
     def _make_report(self) -> None:
         self.report.disabled, self.report.label = True, "Writing report ..."
         self._side_jobs.submit(
-            (make_report, (self.session.settings.case, self._write_report)), self._report_made
+            (make_report, (self.session.settings.case, self._tools.write_report)), self._report_made
         )
 
     def _report_made(self, result: object) -> None:
@@ -317,6 +386,9 @@ def _spectrum_title(result: ContactResult) -> str:
 def layout(view: ContactView) -> Layout:
     """Return the parts of the page by name, and the sections that contain them."""
     parts = {
+        "presets": view.presets,
+        "drawing": view.drawing,
+        "strip": view.strip.model,
         "inputs": view.input_column,
         "more": view.more,
         "drop": view.drop,
@@ -335,8 +407,9 @@ def layout(view: ContactView) -> Layout:
         "notes": view.notes,
         "download": view.download.model,
     }
-    inputs: list[PageBlock] = [{"names": [name]} for name in ("inputs", "more", "drop")]
+    inputs: list[PageBlock] = [{"names": [name]} for name in ("drawing", "inputs", "more", "drop")]
     results: list[PageBlock] = [
+        {"names": ["presets"], "first": True},
         {"names": ["status"], "live": True, "first": True},
         {"names": ["message"], "live": True, "first": True},
         {"names": ["tiles"], "first": True},
@@ -347,7 +420,7 @@ def layout(view: ContactView) -> Layout:
         {"names": ["cut", "spectrum"]},
         {"names": ["share", "resonance"], "heading": "Earlier results"},
         {"names": ["notes"]},
-        {"names": ["download"]},
+        {"names": ["download", "strip"]},
     ]
     return parts, [
         {"kind": "inputs", "label": "Inputs", "blocks": inputs},

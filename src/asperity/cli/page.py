@@ -35,10 +35,11 @@ def page_command(
 ) -> None:
     """Serve a page to explore a contact, or to view recordings, a study or a history."""
     try:
-        from asperity.app import open_page, serve_page
+        from asperity.app import ReportTools, open_page, serve_page
 
         opened = open_page(source)
-        serve_page(opened, port=port, listen=listen, ready=_ready, write_report=report.write_report)
+        tools = ReportTools(report.write_report, report.machine_drawing)
+        serve_page(opened, port=port, listen=listen, ready=_ready, tools=tools)
     except ModuleNotFoundError as missing:
         if (missing.name or "").partition(".")[0] not in (
             "panel",
