@@ -25,7 +25,7 @@ from asperity.core.errors import AsperityError, BadInput
 from asperity.core.processes import set_up_worker
 from asperity.ehl import ContactSolution, Iteration, solve_contact
 from asperity.paper import papers_case
-from asperity.results import Run, load_run, solve_case
+from asperity.results import FrictionPoint, Run, load_run, solve_case, stribeck_curve
 from asperity.surface import Surface
 
 ReportWriter = Callable[
@@ -162,6 +162,13 @@ def solve_fully(ticket: Ticket, case: Case) -> ContactResult:
     limit_cells(case.source, case.grid.cells)
     run = _solve(ticket, case)
     return result_of_run(run, time.perf_counter() - start)
+
+
+def solve_at_speed(ticket: Ticket, case: Case, speed: float) -> FrictionPoint:
+    """Solve the contact at another entrainment speed [m/s], as a point of its Stribeck curve."""
+    limit_cells(case.source, case.grid.cells)
+    curve = stribeck_curve(case, speeds=[speed], progress=_progress_hook(ticket, TIME_LIMIT_S))
+    return curve.points[0]
 
 
 def solve_coarsely(ticket: Ticket, case: Case, start: ContactSolution | None) -> CoarseResult:

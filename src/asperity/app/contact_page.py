@@ -6,29 +6,30 @@ from pathlib import Path
 from typing import NamedTuple
 
 from bokeh.models import Column, UIElement
-from markupsafe import Markup
 
 from asperity.app import export
 from asperity.app.contact_jobs import (
-    Drawing,
     JobFailure,
     MachineDrawer,
     ReportWriter,
-    draw_machine,
     make_report,
     open_surface,
 )
 from asperity.app.contact_result import ContactResult
+from asperity.app.contact_tools import Sound, link_button, picture_button
 from asperity.app.figures import SPECTRUM_HEIGHT, TRIALS_HEIGHT, SpectrumFigure, TrialFigures
 from asperity.app.jobs import JobQueue, WorkerPool
+from asperity.app.machine_drawing import MachineDrawing
 from asperity.app.map_images import MapImages, placeholder
 from asperity.app.presets import TITLES, preset_case
 from asperity.app.session import ContactSession
 from asperity.app.settings import Settings, preset_key, surface_key
+from asperity.app.speed_curve import SpeedCurve
 from asperity.app.surface_store import SurfaceStore
 from asperity.app.uploads import FileDrop
 from asperity.app.widgets import (
-    DRAWING,
+    CHIP,
+    CHOSEN,
     DROP,
     HEADLINE,
     INHERIT,
@@ -93,10 +94,14 @@ class ContactView:
         self._worker_pool, self._deliver = worker_pool, deliver
         coarse, full = (JobQueue(worker_pool, deliver, solves=True) for _ in range(2))
         self.session = ContactSession(settings, coarse, self.draw, full)
-        self._side_jobs, self._drawings = (JobQueue(worker_pool, deliver) for _ in range(2))
+        self._side_jobs = JobQueue(worker_pool, deliver)
+        self.drawing = MachineDrawing(worker_pool, deliver, tools.draw_machine)
+        self.sound = Sound()
+        self.speeds = SpeedCurve(
+            JobQueue(worker_pool, deliver, solves=True), lambda: not self.session.pending
+        )
         self.inputs: dict[str, InputWidget] = {}
         self._built: Case | MachineCase | None = None
-        self._sketched: MachineCase | None = None
         self._more = False
         self._drawn: tuple[ContactResult, ContactResult | None] | None = None
         self._create_outputs()
@@ -109,12 +114,17 @@ class ContactView:
         self.maps = MapImages()
         self.spectrum = placeholder(SPECTRUM_HEIGHT)
         self.share, self.resonance = placeholder(TRIALS_HEIGHT), placeholder(TRIALS_HEIGHT)
+        self.stribeck = placeholder(TRIALS_HEIGHT)
         self._spectrum: SpectrumFigure | None = None
         self._trials: TrialFigures | None = None
-        self._pending_figures = [*self.maps.steps(), self._make_spectrum, self._make_trials]
+        self._pending_figures = [
+            *self.maps.steps(),
+            self._make_spectrum,
+            self._make_trials,
+            self._make_speeds,
+        ]
         self.status, self.verdict, self.notes, self.message = (text_block() for _ in range(4))
         self.tiles = text_block(TILE_STYLES)
-        self.drawing = text_block(DRAWING)
         self.strip = HeadlineStrip()
         self.stale_mark = StaleMark(self.status)
         self.download = Download()
@@ -133,12 +143,18 @@ class ContactView:
             stylesheets=[LOOK, DROP],
         )
         self.more = button("More inputs", self._show_more)
-        chips = [button(title, partial(self._open_preset, key)) for key, title in TITLES.items()]
-        self.presets = button_row(*chips)
+        self._chips = {
+            key: button(title, partial(self._open_preset, key)) for key, title in TITLES.items()
+        }
+        self.presets = button_row(*self._chips.values())
+        self.presets.styles = {"flex-wrap": "nowrap", "overflow-x": "auto"}
         self.pin = button("Pin to compare", self._pin)
         self.report = button("Report", self._make_report)
         self.buttons = button_row(
+            self.sound.button,
             self.pin,
+            link_button(),
+            picture_button(),
             button("Case file", self._give_case),
             button("Python script", self._give_script),
             self.report,
@@ -171,7 +187,8 @@ class ContactView:
         self._pending_figures.clear()
         self.session.close()
         self._side_jobs.close()
-        self._drawings.close()
+        self.drawing.close()
+        self.speeds.close()
         self.drop.close()
 
     # Results
@@ -197,8 +214,13 @@ class ContactView:
                 "" if rejected else session.settings.remark(key),
             )
         self.stale_mark.show(session.stale)
-        self._draw_machine()
+        for key, chip in self._chips.items():
+            chosen = key == session.settings.preset
+            chip.stylesheets = [LOOK, CHIP, *([CHOSEN] if chosen else [])]
+        self.drawing.show(session.settings.machine)
         self._draw_strip(loading=loading)
+        if session.pending:
+            self.speeds.pause()
         if session.result is not None:
             self.tiles.text = tiles(
                 [tile for tile in session.result.tiles if tile.key not in HEADLINE],
@@ -225,23 +247,6 @@ class ContactView:
             )
         self.strip.show(html, busy=loading)
 
-    def _draw_machine(self) -> None:
-        """Draw the machine when it has changed."""
-        machine = self.session.settings.machine
-        if machine is self._sketched:
-            return
-        self._sketched = machine
-        if machine is None:
-            self.drawing.text = ""
-            return
-        self._drawings.submit(
-            (draw_machine, (machine, self._tools.draw_machine)), self._machine_drawn
-        )
-
-    def _machine_drawn(self, result: object) -> None:
-        if isinstance(result, Drawing) and self._sketched is not None:
-            self.drawing.text = Markup('<img src="{}" alt="{}"><p>{}</p>').format(*result)
-
     def _draw_result(self, result: ContactResult, pinned: ContactResult | None) -> None:
         self.maps.show(result, pinned)
         if result.coarse:
@@ -250,6 +255,9 @@ class ContactView:
         self.notes.text = notes(result.notes)
         self._draw_spectrum()
         self._draw_trials()
+        self.sound.show(result)
+        if not self.session.pending and result.converged:
+            self.speeds.follow(self.session.settings.case, result)
         self._set_address(self.session.settings.address)
 
     def _make_spectrum(self) -> None:
@@ -261,6 +269,9 @@ class ContactView:
         self._trials = TrialFigures(self._restore)
         self.share.children, self.resonance.children = [self._trials.share], [self._trials.crf]
         self._draw_trials()
+
+    def _make_speeds(self) -> None:
+        self.stribeck.children = [self.speeds.create()]
 
     def _draw_spectrum(self) -> None:
         result = self.session.result
@@ -387,8 +398,8 @@ def layout(view: ContactView) -> Layout:
     """Return the parts of the page by name, and the sections that contain them."""
     parts = {
         "presets": view.presets,
-        "drawing": view.drawing,
-        "strip": view.strip.model,
+        "drawing": view.drawing.model,
+        "headline": view.strip.model,
         "inputs": view.input_column,
         "more": view.more,
         "drop": view.drop,
@@ -402,6 +413,8 @@ def layout(view: ContactView) -> Layout:
         "change": view.maps.change,
         "cut": Column(view.maps.cut_pressure, view.maps.cut_film, sizing_mode="stretch_width"),
         "spectrum": view.spectrum,
+        "stribeck": view.stribeck,
+        "sound": view.sound.model,
         "share": view.share,
         "resonance": view.resonance,
         "notes": view.notes,
@@ -418,9 +431,10 @@ def layout(view: ContactView) -> Layout:
         {"names": ["film", "pressure"], "key": MAP_KEY, "first": True},
         {"names": ["change"]},
         {"names": ["cut", "spectrum"]},
+        {"names": ["stribeck"]},
         {"names": ["share", "resonance"], "heading": "Earlier results"},
         {"names": ["notes"]},
-        {"names": ["download", "strip"]},
+        {"names": ["download", "headline", "sound"]},
     ]
     return parts, [
         {"kind": "inputs", "label": "Inputs", "blocks": inputs},

@@ -265,7 +265,8 @@ class CaseInput:
 
 def shown(text: str) -> str:
     """Return a value as the page shows it: µm for um, ° for deg."""
-    return re.sub(r"\bum\b", "µm", re.sub(r" deg(?=C|F|$)", " °", text)).replace(" °", "°")
+    degrees = re.sub(r" deg$", "°", re.sub(r" deg(?=[CF]$)", " °", text))
+    return re.sub(r"\bum\b", "µm", degrees)
 
 
 def written(text: str) -> str:

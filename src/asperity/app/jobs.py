@@ -13,7 +13,7 @@ from asperity.app.contact_jobs import JobFailure, Superseded, Ticket, run_job, s
 from asperity.core.processes import cores
 
 MAX_WORKERS = 4
-SLOTS = 4096  # largest number of queues, five per session
+SLOTS = 4096  # largest number of queues, six per session
 
 Work = tuple[
     Callable[..., object], tuple[object, ...]
@@ -174,6 +174,13 @@ class JobQueue:
         self._waiting = (work, on_result)
         if not self._running:
             self._next()
+
+    def cancel(self) -> None:
+        """Cancel the running and the waiting job."""
+        self._number += 1
+        if self._slot >= 0:
+            self._worker_pool.newest[self._slot] = self._number
+        self._waiting = None
 
     def close(self) -> None:
         """Cancel all jobs and release the slot."""

@@ -374,7 +374,7 @@ def _table(series: RecordingSeries) -> Markup:
         rows.append(Markup("<tr><th>{}</th>{}<td>{}</td></tr>").format(row["file"], cells, remark))
     body = Markup("").join(rows)
     return Markup(
-        "<table><thead><tr><th>recording</th>{}<th></th></tr></thead><tbody>{}</tbody></table>"
+        "<h2>Recordings</h2><table><thead><tr><th>recording</th>{}<th></th></tr></thead><tbody>{}</tbody></table>"
     ).format(head, body)
 
 
@@ -405,7 +405,7 @@ def layout(view: RecordingsView) -> Layout:
         {"names": ["waterfall", "track"], "first": True},
         {"names": ["choice"]},
         {"names": ["one"]},
-        {"names": ["table"], "heading": "Recordings"},
+        {"names": ["table"]},
         {"names": ["notes"]},
     ]
     return parts, [

@@ -82,6 +82,8 @@ DRAWING = """
 img { display: block; width: 100%; height: auto; background: #fff; border-radius: 4px; }
 p { margin: 4px 0 0; font-size: .8rem; color: var(--soft); }
 """
+CHIP = ".bk-btn { border-radius: 99px; padding: 3px 12px; white-space: nowrap; font-size: .9rem; }"
+CHOSEN = ".bk-btn { border-color: var(--accent); box-shadow: inset 0 0 0 1px var(--accent); }"
 WRONG = ".bk-input { border-color: var(--alarm); border-width: 2px; }"
 SENTENCE = """
 p { margin: 2px 0 4px; }
@@ -120,6 +122,7 @@ dl.stale dd { opacity: .45; } dl.wrong { outline: 3px solid var(--alarm); }
 
 
 TABLE = """
+h2 { font-size: 1rem; margin: 18px 0 6px; }
 div { overflow-x: auto; }
 table { border-collapse: collapse; width: 100%; font-size: .86rem; font-variant-numeric:
   tabular-nums; }
