@@ -102,12 +102,8 @@ Object.assign(sound, {player, gain, count: sound.count + 1, level: rms / sound.r
 """
 _COPY = """
 const say = text => { button.label = text; setTimeout(() => { button.label = "Copy link" }, 2000) }
-try {
-  await navigator.clipboard.writeText(location.href)
-  say("Link copied")
-} catch {
-  prompt("Copy this link", location.href)
-}
+const copied = navigator.clipboard?.writeText(location.href) ?? Promise.reject()
+copied.then(() => say("Link copied"), () => prompt("Copy this link", location.href))
 """
 _PICTURE = """
 const shown = label => [...Bokeh.index.query(view => view.model.type === "Figure"
