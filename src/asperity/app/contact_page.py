@@ -206,17 +206,8 @@ class ContactView:
             else "soft"
         )
         status = session.status if session.stale or not self._pending_figures else "Drawing ..."
-        for key, widget in self.inputs.items():
-            rejected = session.rejected.get(key)
-            widget.show(
-                rejected.text if rejected else session.settings.text(key),
-                rejected.message if rejected else "",
-                "" if rejected else session.settings.remark(key),
-            )
+        self._draw_inputs()
         self.stale_mark.show(session.stale)
-        for key, chip in self._chips.items():
-            chosen = key == session.settings.preset
-            chip.stylesheets = [LOOK, CHIP, *([CHOSEN] if chosen else [])]
         self.drawing.show(session.settings.machine)
         self._draw_strip(loading=loading)
         if session.pending:
@@ -236,6 +227,20 @@ class ContactView:
         self.status.text = sentences(
             [f"{notice}{status}"], kind
         )  # last: a screen reader announces it when the page is complete
+
+    def _draw_inputs(self) -> None:
+        """Show values, errors and remarks of the inputs, and the selected preset."""
+        session = self.session
+        for key, widget in self.inputs.items():
+            rejected = session.rejected.get(key)
+            widget.show(
+                rejected.text if rejected else session.settings.text(key),
+                rejected.message if rejected else "",
+                "" if rejected else session.settings.remark(key),
+            )
+        for key, chip in self._chips.items():
+            chosen = key == session.settings.preset
+            chip.stylesheets = [LOOK, CHIP, *([CHOSEN] if chosen else [])]
 
     def _draw_strip(self, *, loading: bool) -> None:
         """Draw regime, load share and resonance, which stay visible."""

@@ -281,7 +281,7 @@ def _resonance_spectrum(run: Run) -> ResonanceSpectrum | None:
     )
 
 
-def _sound(run: Run) -> dict[str, Any]:
+def _sound(run: Run) -> Numbers:
     """Return the beginning of the simulated acceleration in single precision, and its rate."""
     response = None if run.vibration is None else run.vibration.response
     if response is None:

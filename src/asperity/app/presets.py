@@ -12,11 +12,11 @@ from hashlib import sha256
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from asperity.app.contact_result import ContactResult, ResonanceSpectrum
+from asperity.app.contact_result import ContactResult, Numbers, ResonanceSpectrum
 from asperity.case import Case, MachineCase, load_case, load_machine
 from asperity.paper import papers_case
 
@@ -78,7 +78,7 @@ def stored_result(case: Case) -> StoredResult | None:
         return None
     data = files("asperity.app").joinpath("preset_data", name).read_bytes()
     with np.load(io.BytesIO(data), allow_pickle=False) as stored:
-        values = json.loads(str(stored["values"]))
+        values: Numbers = json.loads(str(stored["values"]))
         spectrum = values.pop("spectrum")
         if spectrum is not None:
             curves = {key: stored[f"spectrum_{key}"] for key in CURVES}
@@ -86,18 +86,18 @@ def stored_result(case: Case) -> StoredResult | None:
                 **curves, **{**spectrum, "band_hz": tuple(spectrum["band_hz"])}
             )
         maker = values.pop("version")
-        pairs = {key: _tuples(values.pop(key)) for key in ("extent", "half_widths", "notes")}
+        values |= {key: _tuples(values[key]) for key in ("extent", "half_widths", "notes")}
         maps = {key: stored[key] for key in FIELDS}
-    return StoredResult(ContactResult(**maps, **pairs, **values, spectrum=spectrum), maker)
+    return StoredResult(ContactResult(**maps, **values, spectrum=spectrum), maker)
 
 
 def store_result(case: Case, result: ContactResult, path: Path) -> str:
     """Write the result of a case to a file; return the digest of the case."""
     skipped = {*FIELDS, "spectrum", "sound", "sound_rate_hz"}
-    values: dict[str, Any] = {
+    values: Numbers = {
         part.name: getattr(result, part.name) for part in fields(result) if part.name not in skipped
     }
-    spectrum, curves = result.spectrum, dict[str, Any]()
+    spectrum, curves = result.spectrum, Numbers()
     values["spectrum"] = None
     if spectrum is not None:
         curves = {f"spectrum_{key}": getattr(spectrum, key).astype(np.float32) for key in CURVES}
@@ -113,6 +113,6 @@ def store_result(case: Case, result: ContactResult, path: Path) -> str:
     return case_digest(case)
 
 
-def _tuples(values: Any) -> Any:
+def _tuples(values: object) -> object:
     """Return nested lists as tuples."""
     return tuple(map(_tuples, values)) if isinstance(values, list) else values

@@ -70,6 +70,18 @@ class RecordingsView:
         self.series: RecordingSeries | None = None
         self.status, self.verdict, self.notes = (text_block() for _ in range(3))
         self.table = text_block(TABLE)
+        self._create_inputs()
+        self._build_figures()
+        for part in (self.waterfall, self.track, self.one, self.choice):
+            part.visible = False  # until there are recordings
+        if folder is None:
+            self._tell(
+                "Drop recordings (CSV, WAV, HDF5, TDMS, UFF ...) to see the contact resonance and "
+                "its trend, or try an example: the paper's wear test, simulated."
+            )
+
+    def _create_inputs(self) -> None:
+        """Create the file drop, the typed properties and the buttons."""
         self.drop = FileDrop(
             limit=RECORDING_LIMIT,
             on_file=self._file_dropped,
@@ -97,17 +109,9 @@ class RecordingsView:
         )
         self.reread = button("Read again", self.read)
         self.example = button("Try an example", self._open_example)
-        self.example.visible = folder is None
+        self.example.visible = self._folder is None
         self.choice = Select(title="Recording", options=[], **style)
         self.choice.on_change("value", lambda _name, _old, new: self._show_one(new))
-        self._build_figures()
-        for part in (self.waterfall, self.track, self.one, self.choice):
-            part.visible = False  # until there are recordings
-        if folder is None:
-            self._tell(
-                "Drop recordings (CSV, WAV, HDF5, TDMS, UFF ...) to see the contact resonance and "
-                "its trend, or try an example: the paper's wear test, simulated."
-            )
 
     def _build_figures(self) -> None:
         self._build_waterfall()
