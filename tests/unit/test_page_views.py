@@ -12,7 +12,7 @@ from asperity.app.opening import open_page
 from asperity.app.recording_jobs import RecordingContext, RecordingInputs, track_files, track_folder
 from asperity.core.signals import Signal
 from asperity.monitoring import TrackSettings, track_recordings
-from asperity.paper import papers_case
+from asperity.paper import RigSettings, papers_case, simulate_rig, write_rig
 from asperity.simulation import run_history, run_wear
 from asperity.study import load_study, plan_study, run_study
 from asperity.vibration import ContactOscillator, acceleration, white_noise
@@ -146,3 +146,19 @@ def test_a_damaged_folder_is_reported_in_one_sentence(study, tmp_path):
     )
     assert isinstance(run_job(open_study, NO_SESSION, tmp_path), JobFailure)
     assert isinstance(run_job(open_history, NO_SESSION, tmp_path), JobFailure)
+
+
+def test_the_folder_of_a_rig_is_read_with_its_table_and_case(tmp_path):
+    folder = tmp_path / "rig"
+    write_rig(simulate_rig(RigSettings(samples=7, repeats=1, duration_s=2.0)), folder)
+    for path in folder.iterdir():
+        os.utime(path, (1e9, 1e9))
+    opened = open_page(folder)
+    assert (opened.kind, opened.table, opened.stated) == ("recordings", folder / "table.csv", True)
+    context = RecordingContext(opened.case, opened.table)
+    (tmp_path / "memory").mkdir()
+    series = track_folder(NO_SESSION, folder, tmp_path / "memory", RecordingInputs(), context)
+    track = track_recordings([folder], case=opened.case, table=opened.table)
+    assert series.verdict == track.verdict()
+    assert "Severe wear" in series.verdict
+    assert (series.x_name, len(series.rows)) == ("sq_um", 7)
