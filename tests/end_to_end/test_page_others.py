@@ -181,7 +181,7 @@ def test_the_folder_of_a_rig_gives_the_verdict_of_track(browser, tmp_path, rig, 
         visit = Visit(browser, server)
         page = visit.go("recordings")
         page.get_by_text("7 recordings read").wait_for()
-        shown = page.locator(".block.verdict").inner_text()
+        shown = page.locator(".block.verdict p").first.inner_text()
         assert plain(shown) == plain(verdict)
         visit.close()
 
