@@ -35,10 +35,11 @@ def page_command(
 ) -> None:
     """Explore a contact, recordings or a study in the browser."""
     try:
-        from asperity.app import open_page, serve_page
+        from asperity.app import ReportTools, open_page, serve_page
 
         opened = open_page(source)
-        serve_page(opened, port=port, listen=listen, ready=_ready, write_report=report.write_report)
+        tools = ReportTools(report.write_report, report.machine_drawing)
+        serve_page(opened, port=port, listen=listen, ready=_ready, tools=tools)
     except ModuleNotFoundError as missing:
         if (missing.name or "").partition(".")[0] not in (
             "panel",
