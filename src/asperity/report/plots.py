@@ -112,13 +112,10 @@ def _one_panel(medium: Medium, draw: Callable[[Axes], None]) -> Figure:
 
 def _draw_heights(axes: Axes, surface: Surface) -> None:
     grid = surface.grid
-    corners = [
-        float(display(key, end))
-        for key, side in (("x_m", 0), ("y_m", 1))
-        for end in (grid.lower[side], grid.upper[side])
-    ]
+    left, right = (float(display("x_m", end[0])) for end in (grid.lower, grid.upper))
+    bottom, top = (float(display("y_m", end[1])) for end in (grid.lower, grid.upper))
     heights = display("height_m", surface.heights.T)
-    image = axes.imshow(heights, origin="lower", extent=tuple(corners), cmap="viridis")
+    image = axes.imshow(heights, origin="lower", extent=(left, right, bottom, top), cmap="viridis")
     name_axes(axes, "x_m", "y_m")
     axes.set_title(quantity("sq_m").named(surface.sq))
     figure: Any = axes.figure
