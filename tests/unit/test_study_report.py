@@ -494,7 +494,7 @@ def test_samples_are_averaged_in_groups():
     overview = StudyOverview(synthetic_study(points, clr=sq / 4.0))
     (axis,) = overview.axes  # alpha has a single value and no axis
     assert axis.binned
-    x, mean, low, high = group_means(axis.values, 25.0 * axis.values, binned=True)
+    x, mean, low, high = group_means("crf_hz", axis.values, 25.0 * axis.values, binned=True)
     assert len(x) == 8
     assert mean == pytest.approx(25.0 * x)
     assert mean.mean() == pytest.approx(25.0 * axis.values.mean())  # groups of five
