@@ -137,11 +137,15 @@ def for_paper(figure: Figure) -> Figure:
             title.set_text("")
     if figure.legends:
         figure.draw_without_rendering()
-    for legend in figure.legends:
+    for first in list(figure.legends):
+        legend = first
         columns = legend._ncols  # type: ignore[attr-defined]
+        names = [text.get_text() for text in legend.get_texts()]
         while columns > 1 and legend.get_window_extent().width > figure.bbox.width:
             columns -= 1
-            legend.set_ncols(columns)
+            handles = legend.legend_handles
+            legend.remove()
+            legend = figure.legend(handles, names, loc="outside lower center", ncols=columns)
             figure.draw_without_rendering()
     return figure
 
