@@ -104,8 +104,7 @@ class WearCurve:
         middle = float(weights[used] @ mean[used])
         # the surfaces of neighbouring levels are independent
         error = float(np.sqrt(np.sum((weights[used] * half_width[used]) ** 2)))
-        low, high = interval_in_range(quantity, np.array([middle]), np.array([error]))[0]
-        return middle, float(low), float(high)
+        return middle, *_single_interval(quantity, middle, error)
 
     @cached_property
     def stages(self) -> dict[str, Stages]:
@@ -188,6 +187,11 @@ def interval_in_range(key: str, means: Field, half_widths: Field) -> Field:
         if np.isfinite(row).all():
             row[:] = entry.within_range(float(mean), *map(float, row))
     return np.asarray(ends)
+
+
+def _single_interval(key: str, mean: float, half_width: float) -> tuple[float, float]:
+    low, high = interval_in_range(key, np.array([mean]), np.array([half_width]))[0]
+    return float(low), float(high)
 
 
 def wear_curve(
