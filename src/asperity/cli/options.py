@@ -104,7 +104,7 @@ StudyFigures = Annotated[
     typer.Option(
         "--figures",
         metavar="DIR",
-        help="Folder for a study's figures (PDF and PNG) and tables (csv).",
+        help="Folder for the figures as PDF, 85 and 175 mm wide; of a study, tables too.",
     ),
 ]
 

@@ -48,9 +48,8 @@ def report_command(
             f"a folder's page has no other contents, got {len(paths)} paths; name {folders[0]} only"
         )
     kind = _kind(folders)
-    if kind != "study" and (figures is not None or anchors is not None):
-        option = "--figures" if figures is not None else "--anchors"
-        raise BadInput(f"{option} applies to a study's folder, got {paths[0]}; name that folder")
+    if kind != "study" and anchors is not None:
+        raise BadInput(f"--anchors applies to a study's folder, got {paths[0]}; name that folder")
     if out is None:
         alone = paths[0].with_suffix(".html") if len(paths) == 1 else Path("report.html")
         out = folders[0] / "report.html" if folders else alone
@@ -58,11 +57,11 @@ def report_command(
     if kind == "study":
         _report_study(folders[0], out, figures, anchors, as_json=as_json, quiet=quiet)
     elif kind == "wear":
-        _report_wear(folders[0], out, as_json=as_json, quiet=quiet)
+        _report_wear(folders[0], out, figures, as_json=as_json, quiet=quiet)
     elif kind == "history":
-        _report_history(folders[0], out, as_json=as_json, quiet=quiet)
+        _report_history(folders[0], out, figures, as_json=as_json, quiet=quiet)
     else:
-        _report_runs(paths, out, as_json=as_json, quiet=quiet)
+        _report_runs(paths, out, figures, as_json=as_json, quiet=quiet)
     open_page(out, requested=opened)
 
 
@@ -75,15 +74,17 @@ def _kind(folders: list[Path]) -> Literal["runs", "study", "wear", "history"]:
     return "history" if simulation.is_history_folder(folders[0]) else "study"
 
 
-def _report_runs(paths: list[Path], out: Path, *, as_json: bool, quiet: bool) -> None:
+def _report_runs(
+    paths: list[Path], out: Path, figures: Path | None, *, as_json: bool, quiet: bool
+) -> None:
     for path in paths:
         _require_run(path)
     runs = [results.load_run(path) for path in paths]
-    report.write_report(runs, out)
+    report.write_report(runs, out, figures=figures)
     show(
         [run.verdict() for run in runs],
-        lambda: {"report": str(out), "runs": [run.summary() for run in runs]},
-        written("Report", out),
+        lambda: {**_paths(out, figures), "runs": [run.summary() for run in runs]},
+        [*written("Report", out), *written("Figures", figures)],
         as_json=as_json,
         quiet=quiet,
     )
@@ -104,25 +105,29 @@ def _require_run(path: Path) -> None:
         )
 
 
-def _report_history(folder: Path, out: Path, *, as_json: bool, quiet: bool) -> None:
+def _report_history(
+    folder: Path, out: Path, figures: Path | None, *, as_json: bool, quiet: bool
+) -> None:
     history = simulation.load_history(folder)
-    report.write_motion_report(history, out)
+    report.write_motion_report(history, out, figures=figures)
     show(
         history.verdict(),
-        lambda: {"report": str(out), "history": history.scalars()},
-        written("Report", out),
+        lambda: {**_paths(out, figures), "history": history.scalars()},
+        [*written("Report", out), *written("Figures", figures)],
         as_json=as_json,
         quiet=quiet,
     )
 
 
-def _report_wear(folder: Path, out: Path, *, as_json: bool, quiet: bool) -> None:
+def _report_wear(
+    folder: Path, out: Path, figures: Path | None, *, as_json: bool, quiet: bool
+) -> None:
     history = simulation.load_wear(folder)
-    report.write_wear_report(history, out)
+    report.write_wear_report(history, out, figures=figures)
     show(
         history.verdict(),
-        lambda: {"report": str(out), "wear": history.scalars()},
-        written("Report", out),
+        lambda: {**_paths(out, figures), "wear": history.scalars()},
+        [*written("Report", out), *written("Figures", figures)],
         as_json=as_json,
         quiet=quiet,
     )
@@ -141,11 +146,14 @@ def _report_study(
     result = study.load_study(folder)
     with progress("the study's page", quiet=quiet) as display:
         report.write_study_report(result, out, figures=figures, anchors=chosen, progress=display)
-    paths = {"report": str(out), "figures": None if figures is None else str(figures)}
     show(
         study.study_verdict(result),
-        lambda: {**study.study_scalars(result), **paths},
+        lambda: {**study.study_scalars(result), **_paths(out, figures)},
         [*written("Report", out), *written("Figures and tables", figures)],
         as_json=as_json,
         quiet=quiet,
     )
+
+
+def _paths(out: Path, figures: Path | None) -> dict[str, str | None]:
+    return {"report": str(out), "figures": None if figures is None else str(figures)}
