@@ -15,7 +15,7 @@ import matplotlib
 import numpy as np
 import numpy.typing as npt
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize, to_rgb
+from matplotlib.colors import Colormap, Normalize, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from PIL import Image
@@ -48,7 +48,7 @@ TEXTS: Mapping[Kind, tuple[str, str]] = {  # title and caption
     "pressure": ("Pressure", "Total pressure of oil and asperities."),
     "contact": ("Asperity contact", "Contact state: asperity contact, oil film, cavitated film."),
 }
-COLOURS = {"gap": FILM_COLOURS, "pressure": STRESS_COLOURS}
+COLOURS: dict[str, str | Colormap] = {"gap": FILM_COLOURS, "pressure": STRESS_COLOURS}
 CLASSES = {"oil film": OIL_COLOUR, "cavitated": CAVITY_COLOUR, "asperity contact": CONTACT_COLOUR}
 
 

@@ -143,7 +143,7 @@ def for_paper(figure: Figure) -> Figure:
         names = [text.get_text() for text in legend.get_texts()]
         while columns > 1 and legend.get_window_extent().width > figure.bbox.width:
             columns -= 1
-            handles = legend.legend_handles
+            handles = [*filter(None, legend.legend_handles)]
             legend.remove()
             legend = figure.legend(handles, names, loc="outside lower center", ncols=columns)
             figure.draw_without_rendering()
