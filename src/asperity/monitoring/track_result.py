@@ -157,7 +157,7 @@ class Track(Displayed):
         finding = " ".join(filter(None, [finding, sensor_summary(self.recordings)]))
         alarm = self.alarm
         meaning = crf_meaning(alarm, self.recordings)
-        finding = " ".join(filter(None, [self.fault_sentence(), meaning, finding]))
+        finding = " ".join(filter(None, [self.fault_sentence(), finding, meaning]))
         if alarm.explained:
             finding = f"{finding} {alarm.explained[0].upper()}{alarm.explained[1:]}."
         if alarm.state == "alarm":
