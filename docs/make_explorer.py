@@ -15,7 +15,7 @@ import matplotlib
 import numpy as np
 from matplotlib.colors import to_rgb
 
-from asperity.report.style import CAVITY_COLOUR, CONTACT_COLOUR
+from asperity.report.style import CAVITY_STRIPE, CONTACT_COLOUR
 from asperity.results import BOUNDARY_FROM, FULL_FILM_BELOW
 
 DOCS = Path(__file__).parent
@@ -28,7 +28,7 @@ REGIMES = {
     MIXED: "oil and asperities share the load",
     BOUNDARY: "asperities carry 90 % of the load or more",
 }
-FILM_SHADES, PRESSURE_SHADES = "Blues", "inferno"
+FILM_SHADES, PRESSURE_SHADES = "Blues", "Purples"
 
 
 def regime(contact: dict[str, Any]) -> str:
@@ -53,7 +53,7 @@ def palettes(levels: int) -> dict[str, list[list[int]]]:
     pressure = matplotlib.colormaps[PRESSURE_SHADES](np.sqrt(shares))[:, :3]
     return {
         "film": _bytes([to_rgb(CONTACT_COLOUR), *film]),
-        "pressure": _bytes([to_rgb(CAVITY_COLOUR), *pressure]),
+        "pressure": _bytes([to_rgb(CAVITY_STRIPE), *pressure]),
     }
 
 

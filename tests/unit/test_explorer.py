@@ -61,7 +61,8 @@ def test_stored_contacts_equal_a_fresh_solution(stored, point):
         assert contact.numbers[key] == (expected and pytest.approx(expected, rel=5e-3)), key
     height, width = contact.film.shape
     down, right = divmod(index, len(program.ROUGHNESSES) * len(program.LOADS))
-    tile = np.asarray(Image.open(program.MAPS))[2 * height * down :, width * right :]
+    with Image.open(program.MAPS) as sheet:
+        tile = np.asarray(sheet)[2 * height * down :, width * right :]
     for part, fresh in enumerate((contact.film, contact.pressure)):
         kept = tile[part * height : (part + 1) * height, :width].astype(int)
         assert np.mean(np.abs(kept - fresh) > 1) < 0.01
@@ -127,7 +128,7 @@ def test_page_works_in_a_browser(stored, width):
         assert "Load" in page.get_by_role("slider").last.evaluate(
             "slider => slider.labels[0].textContent"
         )
-        assert f"{100 * row_at(stored, 2.0, 1.0, 500.0)['clr']:.1f} %" in start
+        assert f"{100 * row_at(stored, 2.0, 1.0, 500.0)['clr']:.1f}\u00a0%" in start
         assert row_at(stored, 2.0, 1.0, 500.0)["verdict"] in start
         assert colours(page, "film") > 10
         before = page.evaluate("document.getElementById('film').toDataURL()")
@@ -169,7 +170,7 @@ def colours(page, name: str) -> int:
 
 def test_moving_picture_is_small():
     path = ROOT / "docs" / "images" / "running-roughness.webp"
-    picture = Image.open(path)
     assert path.stat().st_size <= 1_500_000
-    assert picture.width == module("draw_motion").WIDTH == 640
-    assert picture.n_frames == module("draw_motion").PASS
+    with Image.open(path) as picture:
+        assert picture.width == module("draw_motion").WIDTH == 640
+        assert picture.n_frames == module("draw_motion").PASS
