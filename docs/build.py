@@ -15,6 +15,7 @@ from importlib.metadata import files as files_of
 from pathlib import Path
 
 import draw_benchmark
+import make_explorer
 import make_quantities
 import make_reference
 from sphinx.cmd.build import main as sphinx
@@ -152,8 +153,9 @@ def stage() -> None:
 
 
 def main() -> int:
-    """Write the page of quantities, stage and build the site; return the exit code."""
-    make_quantities.PAGE.write_text(make_quantities.page(), "utf-8")
+    """Write the generated pages, stage and build the site; return the exit code."""
+    for generator in (make_explorer, make_quantities):
+        generator.PAGE.write_text(generator.page(), "utf-8")
     stage()
     shutil.rmtree(SITE, ignore_errors=True)
     code = sphinx(

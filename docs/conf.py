@@ -47,6 +47,7 @@ html_theme = "pydata_sphinx_theme"
 html_title = "asperity"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+html_extra_path = ["explorer.html"]
 html_show_sourcelink = False
 html_copy_source = False
 html_theme_options = {
