@@ -33,6 +33,7 @@ VIEW = (-2.4, 1.9)  # shown part of the domain along rolling, in Hertz half-widt
 FILMS = (0.05, 5.0)  # ends of the film's scale [um]
 LABEL = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 2}
 OIL_SHADES = "Blues"  # light: thin film, so that contacts stand out
+PRESSURE_SHADES = "Purples"
 
 
 def simulated() -> History:
@@ -62,7 +63,7 @@ class Picture:
         film, pressure = (self.figure.add_axes((left, 0.52, 0.39, 0.41)) for left in (0.09, 0.59))
         self.film = self._map(film, "Film and asperity contact", OIL_SHADES, LogNorm(*FILMS))
         self.film.cmap.set_bad(CONTACT_COLOUR)
-        self.pressure = self._map(pressure, "Pressure", "inferno", PowerNorm(0.5, 0.0, 2.0))
+        self.pressure = self._map(pressure, "Pressure", PRESSURE_SHADES, PowerNorm(0.5, 0.0, 2.0))
         self._bar(self.film, film, "film thickness [µm]", (0.1, 1.0))
         self._bar(self.pressure, pressure, "pressure [GPa]", (0.0, 0.5, 2.0))
         self.mark = self._trace(self.figure.add_axes((0.09, 0.1, 0.89, 0.15)))
