@@ -78,7 +78,7 @@ def test_a_moving_contact_carries_load_on_asperities(follow):
     assert clr.max() - clr.min() > 0.1  # and it changes as the roughness moves
 
 
-def test_a_study_goes_from_a_full_film_to_mixed_lubrication(follow):
+def test_a_study_reaches_mixed_lubrication_from_a_full_film(follow):
     follow("study")
     shares = load_study("study").table.groupby("surface.sq")["clr"].mean()
     assert shares.is_monotonic_increasing

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from functools import singledispatch
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -39,13 +39,13 @@ class _Solved(NamedTuple):
     state: ContactState
 
 
-def draw_result(result: object, what: str = "") -> Figure:
+def draw_result(result: object, drawing: str = "") -> Figure:
     """Draw a result by the name of the drawing; the first one by default."""
     drawings = drawings_of(result)
-    if what:
-        require_choice("drawing", what, tuple(drawings))
+    if drawing:
+        require_choice("drawing", drawing, tuple(drawings))
     with ON_PAGE.drawing():
-        return (drawings[what] if what else next(iter(drawings.values())))(ON_PAGE)
+        return (drawings[drawing] if drawing else next(iter(drawings.values())))(ON_PAGE)
 
 
 @singledispatch
@@ -118,8 +118,7 @@ def _draw_heights(axes: Axes, surface: Surface) -> None:
     image = axes.imshow(heights, origin="lower", extent=(left, right, bottom, top), cmap="viridis")
     name_axes(axes, "x_m", "y_m")
     axes.set_title(quantity("sq_m").named(surface.sq))
-    figure: Any = axes.figure
-    figure.colorbar(image, ax=axes, label=quantity("height_m").axis)
+    axes.figure.colorbar(image, ax=axes, label=quantity("height_m").axis)
 
 
 def _draw_lines(axes: Axes, spectrum: Spectrum) -> None:
