@@ -3,7 +3,6 @@
 """
 
 import os
-import sys
 from pathlib import Path
 
 import pytest
@@ -14,13 +13,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 HERE = Path(__file__).parent
 SLOW = set((HERE / "slow.txt").read_text("utf-8").split())  # files of more than about 10 s
-
-
-@pytest.fixture(autouse=True)
-def _without_log_lines(monkeypatch):
-    """Print no lines of progress in this process; their times depend on the load of the machine."""
-    if (output := sys.modules.get("asperity.cli.output")) is not None:
-        monkeypatch.setattr(output, "FIRST_LINE_S", 1e6)
 
 
 @pytest.fixture

@@ -108,8 +108,7 @@ TOPS = """() => {
 
 
 def tile(page, name="CLR"):
-    """Return a number of the strip."""
-    return page.locator("#headline dl div", has_text=name).locator("dd").first
+    return page.locator("dl div", has_text=name).locator("dd").first
 
 
 def wait_for_change(page, text, name="CLR"):

@@ -1,4 +1,3 @@
-from .contact_page import ReportTools as ReportTools
 from .contact_result import ContactResult as ContactResult
 from .contact_result import ResonanceSpectrum as ResonanceSpectrum
 from .contact_result import ResultTile as ResultTile

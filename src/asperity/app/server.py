@@ -22,14 +22,13 @@ from asperity.app import contact_page as contact
 from asperity.app import history_page as history
 from asperity.app import recordings_page as recordings
 from asperity.app import study_page as study
+from asperity.app.contact_jobs import ReportWriter
 from asperity.app.jobs import WorkerPool
 from asperity.app.opening import OpenedPage
-from asperity.app.recording_jobs import RecordingContext
 from asperity.app.session_cleanup import CLEANUP_MS, SessionSweeper, freeze_objects
 from asperity.app.settings import Settings
 from asperity.app.surface_store import SurfaceStore
 from asperity.app.widgets import PageBlock, PageSection
-from asperity.case import Case
 from asperity.core.errors import BadInput
 
 LOCALHOST = "127.0.0.1"
@@ -102,9 +101,9 @@ class PageSite:
     """All pages of one server, and their worker processes."""
 
     def __init__(
-        self, opened: OpenedPage, worker_pool: WorkerPool, tools: contact.ReportTools
+        self, opened: OpenedPage, worker_pool: WorkerPool, write_report: ReportWriter
     ) -> None:
-        self.opened, self.worker_pool, self.tools = opened, worker_pool, tools
+        self.opened, self.worker_pool, self.write_report = opened, worker_pool, write_report
         self.surfaces = SurfaceStore()
         panel.extension("filedropper", notifications=False)
         self.template = files("asperity.app").joinpath("page.html.j2").read_text("utf-8")
@@ -120,11 +119,11 @@ class PageSite:
     def contact(self) -> Any:
         """Create the page of a contact for one visit."""
         view = contact.ContactView(
-            Settings(self.opened.case, preset=self.opened.preset),
+            Settings(self.opened.case),
             self.worker_pool,
             _deliver(),
             _address(),
-            self.tools,
+            self.write_report,
             self.surfaces,
         )
         parts, sections = contact.layout(view)
@@ -135,15 +134,13 @@ class PageSite:
         )  # in case the event never arrives
         _document().js_on_event("document_ready", view.stale_mark.update_page)
         panel.state.on_session_destroyed(lambda _context: view.close())
-        return self._page("contact", "Contact", parts, sections, headline=view.strip.html)
+        return self._page("contact", "Contact", parts, sections)
 
     def recordings(self) -> Any:
         """Create the page of recordings for one visit."""
         folder = self.opened.path if self.opened.kind == "recordings" else None
-        context = RecordingContext(
-            self.opened.case if self.opened.stated else None, self.opened.table
-        )
-        view = recordings.RecordingsView(folder, context, self.worker_pool, _deliver())
+        case = self.opened.case if self.opened.stated else None
+        view = recordings.RecordingsView(folder, case, self.worker_pool, _deliver())
         panel.state.on_session_destroyed(lambda _context: view.close())
         if folder is not None:
             _document().add_periodic_callback(view.refresh, FOLDER_CHECK_MS)
@@ -153,7 +150,6 @@ class PageSite:
     def study(self) -> Any:
         """Create the page of a study for one visit."""
         assert self.opened.path is not None
-        assert isinstance(self.opened.case, Case)
         view = study.StudyView(self.opened.path, self.opened.case, self.worker_pool, _deliver())
         panel.state.on_session_destroyed(lambda _context: view.close())
         view.begin()
@@ -179,13 +175,7 @@ class PageSite:
         return {name: creators[name] for name, _ in self.links}
 
     def _page(
-        self,
-        kind: str,
-        heading: str,
-        parts: dict[str, object],
-        sections: list[PageSection],
-        *,
-        headline: str = "",
+        self, kind: str, heading: str, parts: dict[str, object], sections: list[PageSection]
     ) -> Any:
         page = panel.Template(self.template, location=True)
         document = _document()
@@ -205,8 +195,6 @@ class PageSite:
             "sections": sections,
             "style": self.style,
             "kind": kind,
-            "headline": headline,
-            "compiling": self.worker_pool.is_compiling,
             "foot": f"asperity {version('asperity')}, {self.opened.name}",
         }
         for name, value in variables.items():
@@ -274,7 +262,7 @@ def serve_page(
     port: int = PORT,
     listen: str = LOCALHOST,
     ready: Callable[[str], None],
-    tools: contact.ReportTools,
+    write_report: ReportWriter,
 ) -> None:
     """Serve the pages until interrupted.
 
@@ -284,7 +272,7 @@ def serve_page(
     port : 0 for a free one
     listen : address to listen on; remote access needs a password in `ASPERITY_PAGE_PASSWORD`
     ready : called with the address of the page when it is available
-    tools : `write_report` and `machine_drawing` of `asperity.report`
+    write_report : writes the report of a run, `asperity.report.write_report`
 
     Raises
     ------
@@ -295,7 +283,7 @@ def serve_page(
     password = password_for(listen)
     port = require_free(listen, port)
     worker_pool = WorkerPool()
-    site = PageSite(opened, worker_pool, tools)
+    site = PageSite(opened, worker_pool, write_report)
     try:
         worker_pool.warm_up()
         login: dict[str, Any] = {}

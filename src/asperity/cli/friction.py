@@ -1,9 +1,7 @@
 """`asperity stribeck` and `asperity traction`: friction over speed and slide-to-roll ratio."""
 
-import csv
 from collections.abc import Callable
 from dataclasses import asdict
-from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,7 +12,7 @@ from asperity.cli.app import app
 from asperity.cli.options import (
     AsJson,
     CaseOrRun,
-    OutFiles,
+    OutPicture,
     Overrides,
     Quiet,
     Roughness,
@@ -23,7 +21,6 @@ from asperity.cli.options import (
     require_output,
 )
 from asperity.cli.output import Block, columns, show, solver_progress, text, written
-from asperity.core import files
 from asperity.core.errors import AsperityError
 from asperity.core.quantities import quantity
 
@@ -45,11 +42,11 @@ def stribeck(
     sq: Roughness = None,
     overrides: Overrides = None,
     snapshot: StandingRoughness = False,
-    out: OutFiles = None,
+    out: OutPicture = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Compute friction over speed, up to full film."""
+    """Compute friction over speed, from boundary lubrication to full film."""
 
     def curve(chosen: "Case", step: "SolverProgress") -> "FrictionCurve":
         return results.stribeck_curve(chosen, speeds=speed, progress=step)
@@ -72,11 +69,11 @@ def traction(
     sq: Roughness = None,
     overrides: Overrides = None,
     snapshot: StandingRoughness = False,
-    out: OutFiles = None,
+    out: OutPicture = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Compute friction over the slide-to-roll ratio."""
+    """Compute friction over the slide-to-roll ratio, from pure rolling."""
 
     def curve(chosen: "Case", step: "SolverProgress") -> "FrictionCurve":
         return results.traction_curve(chosen, slips=slip, progress=step)
@@ -96,24 +93,19 @@ def _cases(
 def _friction_command(
     curve: "Callable[[Case, SolverProgress], FrictionCurve]",
     cases: "list[Case]",
-    out: list[Path] | None,
+    out: Path | None,
     *,
     as_json: bool,
     quiet: bool,
 ) -> None:
-    for path in out or ():
-        require_output(path, ".csv", ".png", ".pdf")
+    require_output(out, ".png")
     curves = []
     for chosen in cases:
         label = f"{chosen.source}, Sq {text('sq_m', chosen.surface().sq)}"
         with solver_progress(label, quiet=quiet) as step:
             curves.append(curve(chosen, step))
-    figures = [path for path in out or () if path.suffix.lower() != ".csv"]
-    tables = [path for path in out or () if path not in figures]
-    for path in figures:
-        report.write_figure(report.friction_figure(curves), path)
-    for path in tables:
-        files.write_text(path, _points_csv(curves))
+    if out is not None:
+        report.write_figure(report.friction_figure(curves), out)
     verdicts = [drawn.verdict() for drawn in curves]
     hints = {drawn.hint() for drawn in curves} - {None}
     show(
@@ -121,11 +113,10 @@ def _friction_command(
         lambda: {
             "verdict": " ".join(verdicts),
             "curves": [drawn.scalars() for drawn in curves],
-            "figures": [str(path) for path in figures],
-            "tables": [str(path) for path in tables],
+            "figures": [] if out is None else [str(out)],
         },
         *([f"  note: {hint}"] for hint in hints),
-        written("Written", *figures, *tables),
+        written("  Figure", out),
         *(_points(drawn) for drawn in curves),
         as_json=as_json,
         quiet=quiet,
@@ -133,16 +124,6 @@ def _friction_command(
     unfinished = sum(not point.converged for drawn in curves for point in drawn.points)
     if unfinished:
         raise AsperityError(f"not converged at {unfinished} marked points; do not use them")
-
-
-def _points_csv(curves: "list[FrictionCurve]") -> str:
-    """Return a csv row per point of all curves, in SI."""
-    rows = [{"sq_m": curve.sq, **asdict(point)} for curve in curves for point in curve.points]
-    buffer = StringIO()
-    writer = csv.DictWriter(buffer, list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return buffer.getvalue()
 
 
 def _points(curve: "FrictionCurve") -> Block:

@@ -19,13 +19,12 @@ from asperity.cli.options import (
     EmulatorFolder,
     ForecastLimit,
     Method,
-    OpenPage,
     Overrides,
     Page,
     Quiet,
     Rate,
+    SampleSeed,
     Scale,
-    Seed,
     Shaft,
     StandingRoughness,
     SurfaceFile,
@@ -33,9 +32,9 @@ from asperity.cli.options import (
     Workers,
     Worn,
     chosen_case,
+    require_output,
 )
 from asperity.cli.output import Block, columns, progress, show, table, written
-from asperity.cli.terminal.browser import open_page, require_page
 from asperity.core import processes
 from asperity.core.errors import BadInput, require_choice
 from asperity.core.quantities import quantity
@@ -56,7 +55,7 @@ if TYPE_CHECKING:
 
 PathsArgument = Annotated[
     list[Path] | None,
-    typer.Argument(metavar="FILE", help="Recordings, or folders of recordings."),
+    typer.Argument(metavar="[FILE...]", help="Recordings, or folders of recordings."),
 ]
 CaseFileOption = Annotated[
     Path | None,
@@ -105,7 +104,7 @@ def infer(
     forecast: ForecastLimit = None,
     worn: Worn = None,
     design: DesignOption = None,
-    seed: Seed = 0,
+    seed: SampleSeed = 0,
     rate: Rate = None,
     unit: Unit = None,
     channel: Channel = None,
@@ -115,18 +114,17 @@ def infer(
     method: Method = None,
     workers: Workers = None,
     page: Page = None,
-    opened: OpenPage = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Infer the state of a contact from recordings, with intervals."""
+    """Infer the state of a contact from recordings, with intervals, and the next point to run."""
     case_file = _required(
         case_file, paths, sampler=sampler, forecast=forecast, worn=worn, design=design
     )
     setting, surface_notes = _setting(case_file, overrides, surface, snapshot=snapshot)
     limit = _limit(forecast, setting, worn)
-    history = _history(worn)
-    require_page(page, requested=opened)
+    history = None if worn is None else simulation.load_wear(worn)
+    require_output(page, ".html", option="--report")
     source = _source(table_file, band, rate, unit, channel, scale, shaft, method)
     count = workers or processes.cores()
     observations = _observe(paths, setting, source, count, quiet=quiet)
@@ -137,7 +135,7 @@ def infer(
     result = _infer(setting, initial, latest, sampler, seed, extend, count, quiet=quiet)
     if result.emulator is not initial:
         ahead = forecaster(result.emulator)
-    _show(result, ahead, design, page, opened=opened, as_json=as_json, quiet=quiet)
+    _show(result, ahead, design, page, as_json=as_json, quiet=quiet)
 
 
 def _infer(
@@ -165,11 +163,6 @@ def _limit(forecast: str | None, setting: "Setting", worn: Path | None) -> "Limi
     limit = inference.read_limit(forecast, setting)
     inference.require_limit(setting, limit, worn=worn is not None)
     return limit
-
-
-def _history(worn: Path | None) -> "WearHistory | None":
-    """Load the wear simulation that is the prior of a forecast, if one is given."""
-    return None if worn is None else simulation.load_wear(worn)
 
 
 def _source(
@@ -273,7 +266,6 @@ def _show(
     design: float | None,
     page: Path | None,
     *,
-    opened: bool,
     as_json: bool,
     quiet: bool,
 ) -> None:
@@ -294,7 +286,7 @@ def _show(
         _points(result),
         _models(result),
         _notes(result),
-        written("Report", page),
+        written("report", page),
     )
     show(
         [*verdicts, result.verdict()],
@@ -303,7 +295,6 @@ def _show(
         as_json=as_json,
         quiet=quiet,
     )
-    open_page(page, requested=opened)
     if ahead is not None and ahead.alarm:
         raise typer.Exit(EXIT_CODES["alarm"])
 

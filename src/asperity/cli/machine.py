@@ -11,7 +11,6 @@ from asperity import case, machines, report
 from asperity.cli.app import app
 from asperity.cli.options import (
     AsJson,
-    OpenPage,
     OutFolder,
     Overrides,
     Quiet,
@@ -21,7 +20,6 @@ from asperity.cli.options import (
 )
 from asperity.cli.output import Block, Row, columns, progress, show, table
 from asperity.cli.study import study_progress
-from asperity.cli.terminal.browser import open_page, require_opened
 from asperity.core import files
 from asperity.core.documents import Table
 from asperity.core.errors import AsperityError
@@ -72,13 +70,10 @@ def machine_command(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Print the contacts' conditions without solving.")
     ] = False,
-    opened: OpenPage = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Solve every contact of a gear pair, bearing, discs or cam."""
-    page = None if out is None or dry_run else out / PAGE
-    require_opened(page, requested=opened, option="--out DIR, without --dry-run")
+    """Solve every contact of a machine: film, load sharing, friction, temperature."""
     chosen = case.load_machine(path, read_overrides(overrides, snapshot=snapshot))
     if dry_run:
         result = machines.machine_conditions(chosen)
@@ -94,15 +89,14 @@ def machine_command(
         table([*_ratings(result), *_stiffness(result)]),
         table(_frequencies(result), [*result.notes, *_unsolved(result)]),
         []
-        if page is None
+        if out is None or dry_run
         else [
-            f"Report: {page}",
+            f"Report: {out / PAGE}",
             f"Saved in {out}; the same command resumes it",
         ],
         as_json=as_json,
         quiet=quiet,
     )
-    open_page(page, requested=opened)
     if result.failures:
         raise AsperityError(
             f"{len(result.failures)} of {len(result.rows)} contacts were not solved; the first: "

@@ -12,7 +12,6 @@ from asperity import case, machines, report, study
 from asperity.cli.app import app
 from asperity.cli.options import (
     AsJson,
-    OpenPage,
     OutFolder,
     Overrides,
     Page,
@@ -25,7 +24,6 @@ from asperity.cli.options import (
     require_output,
 )
 from asperity.cli.output import Block, columns, progress, show, table, text
-from asperity.cli.terminal.browser import open_page, require_opened
 from asperity.core.errors import AsperityError, BadInput
 from asperity.core.quantities import quantity
 
@@ -80,15 +78,13 @@ def study_command(
     snapshot: StandingRoughness = False,
     dry_run: DryRunOption = False,
     page: Page = None,
-    opened: OpenPage = False,
     figures: StudyFigures = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Sweep quantities of a case, on several surfaces; resumable."""
+    """Sweep a case: every point of its [study], on several surfaces each; resumable."""
     part = _shard(shard)
     _require_places(out, page, dry_run=dry_run)
-    require_opened(page, requested=opened)
     if _has_machine(path):
         _refuse_for_machine(page, figures, merge, executor, fields, retry_failed, part != (1, 1))
         replaced = read_overrides(overrides, snapshot=snapshot)
@@ -113,7 +109,6 @@ def study_command(
         )
     page_rows = _make_page(result, page, figures, quiet=quiet)
     _show_result(result, page_rows, as_json=as_json, quiet=quiet)
-    open_page(page, requested=opened)
     return _require_whole(result, part)
 
 

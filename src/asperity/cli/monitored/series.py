@@ -72,7 +72,7 @@ def track_series(options: SimpleNamespace) -> None:
         judged.verdict(),
         lambda: judged.scalars() | {"written": [str(path) for path in saved]},
         _overall_rows(judged),
-        written("Written", *saved) if saved else ["Add --out judged.csv for all rows."],
+        written("  Written", *saved) if saved else ["  Add --out judged.csv for all rows."],
         as_json=options.as_json,
         quiet=options.quiet,
     )

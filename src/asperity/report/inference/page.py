@@ -63,7 +63,6 @@ def render_inference_page(
             if key in posterior
         ],
         warnings=inference.warnings(),
-        meanings=[_meaning(inference, key) for key in posterior],
         marginals=exhibits.marginals(inference).picture(),
         pairs=exhibits.pairs(inference).picture(),
         predicted=exhibits.predicted(inference).picture() if inference.observations else None,
@@ -88,21 +87,6 @@ def render_inference_page(
         ],
         emulator=inference.emulator.sentence(),
         case_text=inference.setting.case.text,
-    )
-
-
-def _meaning(inference: Inference, key: str) -> str:
-    """Explain the posterior of a quantity in one sentence."""
-    estimate = inference.posterior()[key]
-    entry = quantity(key)
-    if not estimate.learnt:
-        return (
-            f"{heading(entry)}: the recordings contain no information; the interval "
-            f"{entry.interval(estimate.low, estimate.high)} is that assumed before."
-        )
-    return (
-        f"{heading(entry)}: with 90 % probability {entry.interval(estimate.low, estimate.high)}, "
-        f"equally likely above and below {entry.text(estimate.median)}."
     )
 
 

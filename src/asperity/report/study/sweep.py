@@ -54,7 +54,7 @@ def output_curves(study: StudyOverview, axis: SweptAxis) -> Exhibit:
     def draw(medium: Medium) -> Figure:
         figure, panels = _panel_figure(len(study.outputs), medium, shape=0.85, legend_lines=1.6)
         for key, axes in zip(study.outputs, panels, strict=True):
-            _draw_output(axes, axis, key, study.used[key].to_numpy(dtype=float))
+            _draw_output(axes, axis, display(key, study.used[key].to_numpy(dtype=float)))
             axes.set_title(quantity(key).label, fontweight="normal", fontsize="small")
         for axes in panels[-min(PANELS_PER_ROW, len(panels)) :]:
             axes.set_xlabel(axis_label(axis))
@@ -82,15 +82,13 @@ def _file_name(axis: SweptAxis) -> str:
     return axis.key.replace(".", "-").replace("_", "-")
 
 
-def _draw_output(axes: Axes, axis: SweptAxis, key: str, stored: Field) -> None:
-    finite = np.isfinite(stored)
-    values = display(key, stored)
+def _draw_output(axes: Axes, axis: SweptAxis, values: Field) -> None:
+    finite = np.isfinite(values)
     dots: Style = {"color": GREY, "alpha": 0.6, "markersize": 4.5, "markeredgewidth": 0}
     axes.plot(
         axis.values[finite], values[finite], ".", rasterized=values.size > MAX_VECTOR_DOTS, **dots
     )
-    x, *means = group_means(key, axis.values[finite], stored[finite], binned=axis.binned)
-    mean, low, high = (display(key, column) for column in means)
+    x, mean, low, high = group_means(axis.values[finite], values[finite], binned=axis.binned)
     style: Style = {"linestyle": "none" if axis.names else "-", "color": BLUE, "markersize": 3.5}
     draw_intervals(axes, x, mean, [mean - low, high - mean], "o", **style)
     limit_to_data(axes, values[finite])
