@@ -524,7 +524,11 @@ def found_row(draw: Callable[[np.random.Generator], Drawn], series: int) -> str:
     late = np.array(delays)
     found, early = 100.0 * np.mean(np.isfinite(late)), 100.0 * np.mean(late < 0.0)
     within = np.sort(late)[int(np.ceil(0.9 * late.size)) - 1]
-    return f"{found:.1f} % | {early:.1f} % | {np.median(late):.0f} | {within:.0f}"
+    delays = " | ".join(
+        f"{delay:.0f}" if np.isfinite(delay) else "not reached"
+        for delay in (np.median(late), within)
+    )
+    return f"{found:.1f} % | {early:.1f} % | {delays}"
 
 
 if __name__ == "__main__":
