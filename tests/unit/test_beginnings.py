@@ -16,8 +16,10 @@ def test_every_starting_case_is_valid(kind):
 
 
 @pytest.mark.parametrize("kind", MACHINES)
-def test_every_starting_machine_is_complete(kind):
-    machine = load_machine(case_template(kind), {})
+def test_every_starting_machine_is_complete(kind, tmp_path):
+    path = tmp_path / f"{kind}.toml"
+    path.write_text(case_template(kind), "utf-8")
+    machine = load_machine(path)
     assert machine.complete
     assert machine.case(machine.contacts[0]).vibration is not None
 
@@ -25,7 +27,9 @@ def test_every_starting_machine_is_complete(kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_template_explains_its_quantities(kind):
     lines = [
-        line for line in case_template(kind).splitlines() if "=" in line and not line.startswith("#")
+        line
+        for line in case_template(kind).splitlines()
+        if "=" in line and not line.startswith("#")
     ]
     assert sum("#" in line for line in lines) > len(lines) / 3
 

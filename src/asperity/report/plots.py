@@ -1,0 +1,130 @@
+"""Drawings of results for `.plot()`, by the exhibits of their reports."""
+
+from collections.abc import Callable, Mapping
+from functools import singledispatch
+from typing import Any, NamedTuple
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from asperity.core.errors import BadInput, require_choice
+from asperity.core.quantities import quantity
+from asperity.core.signals import Spectrum
+from asperity.ehl import ContactSolution, ContactState
+from asperity.machines import MachineResult
+from asperity.monitoring import Track
+from asperity.report.base import Exhibit
+from asperity.report.drawing import display, name_axes
+from asperity.report.machine.contact_path import along_path
+from asperity.report.machine.sketch import machine_sketch
+from asperity.report.motion.exhibits import curves as motion_curves
+from asperity.report.run.contact import centre_line, contact_map, film_map, pressure_map
+from asperity.report.study.page import study_exhibits
+from asperity.report.style import ON_PAGE, Medium
+from asperity.report.track.exhibits import amplitude, trend
+from asperity.report.wear.exhibits import curves as wear_curves
+from asperity.results import Run
+from asperity.simulation import History, WearHistory
+from asperity.solution import contact_state
+from asperity.study import StudyOverview, StudyResult
+from asperity.surface import Surface
+
+Draw = Callable[[Medium], Figure]
+
+
+class _Solved(NamedTuple):
+    """A solution with its state, as the maps of a run need them."""
+
+    solution: ContactSolution
+    state: ContactState
+
+
+def draw_result(result: object, what: str = "") -> Figure:
+    """Draw a result by the name of the drawing; the first one by default."""
+    drawings = drawings_of(result)
+    if what:
+        require_choice("drawing", what, tuple(drawings))
+    with ON_PAGE.drawing():
+        return (drawings[what] if what else next(iter(drawings.values())))(ON_PAGE)
+
+
+@singledispatch
+def drawings_of(result: object) -> Mapping[str, Draw]:
+    """Return the drawings of a result by name."""
+    raise BadInput(f"a {type(result).__name__} has no drawing")
+
+
+def _exhibits(*exhibits: Exhibit) -> dict[str, Draw]:
+    return {exhibit.name: exhibit.draw for exhibit in exhibits}
+
+
+@drawings_of.register
+def _(run: Run) -> Mapping[str, Draw]:
+    return _exhibits(film_map(run), contact_map(run), pressure_map(run), centre_line(run))
+
+
+@drawings_of.register
+def _(solution: ContactSolution) -> Mapping[str, Draw]:
+    solved = _Solved(solution, contact_state(solution))
+    return _exhibits(film_map(solved), pressure_map(solved), centre_line(solved))
+
+
+@drawings_of.register
+def _(track: Track) -> Mapping[str, Draw]:
+    return _exhibits(trend(track), amplitude(track))
+
+
+@drawings_of.register
+def _(result: StudyResult) -> Mapping[str, Draw]:
+    return _exhibits(*study_exhibits(StudyOverview(result)))
+
+
+@drawings_of.register
+def _(history: WearHistory) -> Mapping[str, Draw]:
+    return _exhibits(wear_curves(history))
+
+
+@drawings_of.register
+def _(history: History) -> Mapping[str, Draw]:
+    return _exhibits(motion_curves(history))
+
+
+@drawings_of.register
+def _(result: MachineResult) -> Mapping[str, Draw]:
+    return _exhibits(machine_sketch(result), along_path(result))
+
+
+@drawings_of.register
+def _(surface: Surface) -> Mapping[str, Draw]:
+    return {"map": lambda medium: _one_panel(medium, lambda axes: _draw_heights(axes, surface))}
+
+
+@drawings_of.register
+def _(spectrum: Spectrum) -> Mapping[str, Draw]:
+    return {"density": lambda medium: _one_panel(medium, lambda axes: _draw_lines(axes, spectrum))}
+
+
+def _one_panel(medium: Medium, draw: Callable[[Axes], None]) -> Figure:
+    figure, axes = medium.panel(3.5)
+    draw(axes)
+    return figure
+
+
+def _draw_heights(axes: Axes, surface: Surface) -> None:
+    grid = surface.grid
+    corners = [
+        float(display(key, end))
+        for key, side in (("x_m", 0), ("y_m", 1))
+        for end in (grid.lower[side], grid.upper[side])
+    ]
+    heights = display("height_m", surface.heights.T)
+    image = axes.imshow(heights, origin="lower", extent=tuple(corners), cmap="viridis")
+    name_axes(axes, "x_m", "y_m")
+    axes.set_title(quantity("sq_m").named(surface.sq))
+    figure: Any = axes.figure
+    figure.colorbar(image, ax=axes, label=quantity("height_m").axis)
+
+
+def _draw_lines(axes: Axes, spectrum: Spectrum) -> None:
+    axes.semilogy(spectrum.frequency_hz[1:], spectrum.density[1:], linewidth=0.9)
+    axes.set(xlabel="frequency [Hz]", ylabel=f"power spectral density [{spectrum.unit}]")
