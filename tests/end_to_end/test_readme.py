@@ -51,7 +51,8 @@ def test_the_first_commands_print_the_verdict_shown(asp):
     assert asp(*shlex.split(report)[1:])[0] == 0
 
 
-def test_five_lines_of_python_print_the_verdict_and_draw_the_film(asp):
+def test_five_lines_of_python_print_the_verdict_and_draw_the_film(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     shutil.copytree(ROOT / "examples", "examples")
     block, _ = (block for block in README.blocks if block.language == "python")
     assert len([line for line in block.text.splitlines() if line]) <= 5

@@ -202,7 +202,7 @@ COMMANDS: Mapping[str, tuple[str, ...]] = MappingProxyType(  # that a template i
             "track recordings --table recordings/table.csv --case {case} --report {name}.html",
         ),
         "infer": (
-            "rig --out recordings --samples 1",
+            "rig --out recordings --samples 2 --repeats 3 --snr 20",
             "infer recordings --table recordings/table.csv --case {case} --report {name}.html",
         ),
     }

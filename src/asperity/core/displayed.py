@@ -1,4 +1,4 @@
-"""Results in Python: a short `repr`, a table with a picture in notebooks, and `.plot()`."""
+"""Results in Python: a short text, a table with a picture in notebooks, and drawings."""
 
 from base64 import b64encode
 from collections.abc import Iterator, Mapping
@@ -6,12 +6,16 @@ from dataclasses import fields
 from html import escape
 from importlib import import_module
 from io import BytesIO
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from asperity.core.errors import AsperityError
 from asperity.core.quantities import quantity
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 MAX_REPR = 300  # characters
 SHOWN = (  # in the table of a notebook, where the result has them
@@ -21,7 +25,7 @@ SHOWN = (  # in the table of a notebook, where the result has them
 
 
 class Brief:
-    """Result with a short `repr`: its verdict, or its fields without one."""
+    """Result with a short text: its verdict, or its fields without one."""
 
     __slots__ = ()
 
@@ -38,20 +42,19 @@ class Displayed(Brief):
 
     __slots__ = ()
 
-    def plot(self, what: str = "") -> Any:
-        """Draw the result and return matplotlib axes; `axes.figure` is the figure.
+    def plot(self, drawing: str = "") -> "Axes":
+        """Draw the result and return the first axes of a matplotlib figure.
 
         Parameters
         ----------
-        what : name of a drawing; default: the first one. A wrong name lists them.
+        drawing : its name; default: the first one. A wrong name lists them.
 
         Raises
         ------
         BadInput
             for an unknown drawing.
         """
-        # loaded by name: drawing is above all results, and most of them are never drawn
-        return import_module("asperity.report").draw_result(self, what).axes[0]
+        return _figure(self, drawing).axes[0]
 
     def _repr_html_(self) -> str:
         """Return the verdict, a small table and the first drawing, for notebooks."""
@@ -67,9 +70,9 @@ class Displayed(Brief):
         return f"<div><p>{escape(repr(self))}</p><table>{cells}</table>{picture}</div>"
 
 
-def _fields(value: Any) -> Iterator[str]:
+def _fields(value: object) -> Iterator[str]:
     """Yield the fields of a dataclass as short texts."""
-    for field in fields(value):
+    for field in fields(value):  # type: ignore[arg-type]
         if field.repr:
             yield f"{field.name}={_short(getattr(value, field.name))}"
 
@@ -83,7 +86,7 @@ def _short(value: object) -> str:
     return text if len(text) <= MAX_REPR // 6 else f"{type(value).__name__}(...)"
 
 
-def _rows(scalars: Mapping[str, Any]) -> list[tuple[str, str]]:
+def _rows(scalars: Mapping[str, object]) -> list[tuple[str, str]]:
     """Return the numbers shown, with their intervals; first and last value of a history."""
     rows = []
     for key in SHOWN:
@@ -95,8 +98,14 @@ def _rows(scalars: Mapping[str, Any]) -> list[tuple[str, str]]:
     return rows
 
 
+def _figure(value: Displayed, drawing: str = "") -> "Figure":
+    # loaded by name: drawing is above all results, and most of them are never drawn
+    figure: Figure = import_module("asperity.report").draw_result(value, drawing)
+    return figure
+
+
 def _picture(value: Displayed) -> str:
     image = BytesIO()
-    value.plot().figure.savefig(image, format="png", dpi=110)
+    _figure(value).savefig(image, format="png", dpi=110)
     data = b64encode(image.getvalue()).decode("ascii")
     return f'<img alt="{escape(type(value).__name__)}" src="data:image/png;base64,{data}">'

@@ -1,10 +1,10 @@
 """Drawings of results for `.plot()`, by the exhibits of their reports."""
 
 from collections.abc import Callable, Mapping
-from functools import singledispatch
-from typing import Any, NamedTuple
+from functools import partial, singledispatch
+from typing import NamedTuple
 
-from matplotlib.axes import Axes
+import numpy as np
 from matplotlib.figure import Figure
 
 from asperity.core.errors import BadInput, require_choice
@@ -39,13 +39,13 @@ class _Solved(NamedTuple):
     state: ContactState
 
 
-def draw_result(result: object, what: str = "") -> Figure:
+def draw_result(result: object, drawing: str = "") -> Figure:
     """Draw a result by the name of the drawing; the first one by default."""
     drawings = drawings_of(result)
-    if what:
-        require_choice("drawing", what, tuple(drawings))
+    if drawing:
+        require_choice("drawing", drawing, tuple(drawings))
     with ON_PAGE.drawing():
-        return (drawings[what] if what else next(iter(drawings.values())))(ON_PAGE)
+        return (drawings[drawing] if drawing else next(iter(drawings.values())))(ON_PAGE)
 
 
 @singledispatch
@@ -96,35 +96,28 @@ def _(result: MachineResult) -> Mapping[str, Draw]:
 
 @drawings_of.register
 def _(surface: Surface) -> Mapping[str, Draw]:
-    return {"map": lambda medium: _one_panel(medium, lambda axes: _draw_heights(axes, surface))}
+    return {"map": partial(_height_map, surface)}
 
 
 @drawings_of.register
 def _(spectrum: Spectrum) -> Mapping[str, Draw]:
-    return {"density": lambda medium: _one_panel(medium, lambda axes: _draw_lines(axes, spectrum))}
+    return {"density": partial(_density, spectrum)}
 
 
-def _one_panel(medium: Medium, draw: Callable[[Axes], None]) -> Figure:
+def _height_map(surface: Surface, medium: Medium) -> Figure:
     figure, axes = medium.panel(3.5)
-    draw(axes)
+    (x0, y0), (x1, y1) = surface.grid.lower, surface.grid.upper
+    corners = (*display("x_m", np.array([x0, x1])), *display("y_m", np.array([y0, y1])))
+    heights = display("height_m", surface.heights.T)
+    image = axes.imshow(heights, origin="lower", extent=corners, cmap="viridis")
+    name_axes(axes, "x_m", "y_m")
+    axes.set_title(quantity("sq_m").named(surface.sq))
+    figure.colorbar(image, ax=axes, label=quantity("height_m").axis)
     return figure
 
 
-def _draw_heights(axes: Axes, surface: Surface) -> None:
-    grid = surface.grid
-    corners = [
-        float(display(key, end))
-        for key, side in (("x_m", 0), ("y_m", 1))
-        for end in (grid.lower[side], grid.upper[side])
-    ]
-    heights = display("height_m", surface.heights.T)
-    image = axes.imshow(heights, origin="lower", extent=tuple(corners), cmap="viridis")
-    name_axes(axes, "x_m", "y_m")
-    axes.set_title(quantity("sq_m").named(surface.sq))
-    figure: Any = axes.figure
-    figure.colorbar(image, ax=axes, label=quantity("height_m").axis)
-
-
-def _draw_lines(axes: Axes, spectrum: Spectrum) -> None:
+def _density(spectrum: Spectrum, medium: Medium) -> Figure:
+    figure, axes = medium.panel(3.5)
     axes.semilogy(spectrum.frequency_hz[1:], spectrum.density[1:], linewidth=0.9)
     axes.set(xlabel="frequency [Hz]", ylabel=f"power spectral density [{spectrum.unit}]")
+    return figure
