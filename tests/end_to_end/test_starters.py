@@ -104,7 +104,9 @@ def test_tracking_finds_the_severe_stage_of_the_simulated_rig(follow):
 
 
 def test_inference_learns_the_load_share_of_the_simulated_rig(follow, monkeypatch):
-    monkeypatch.setattr("asperity.inference.emulator.FINER_POINTS", 6)  # of 24 solved on twice the cells
+    monkeypatch.setattr(
+        "asperity.inference.emulator.FINER_POINTS", 6
+    )  # of 24 solved on twice the cells
     _, inferred = follow("infer").values()
     assert Path("infer.html").exists()
     row = next(line for line in inferred.splitlines() if "asperity load share, CLR" in line)

@@ -67,7 +67,7 @@ def test_a_result_is_drawn_in_one_line(results, name, tmp_path):
 @pytest.mark.parametrize("name", DRAWN)
 def test_a_notebook_shows_a_picture(results, name):
     page = results[name]._repr_html_()
-    assert re.search(r'<img alt="\w+" src="data:image/png;base64,[\w+/=]{2000,}">', page)
+    assert re.search(r'<img alt="\w+" [^>]+src="data:image/png;base64,[\w+/=]{2000,}">', page)
 
 
 def test_a_notebook_shows_the_numbers_of_a_run(results):

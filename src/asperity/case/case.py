@@ -434,7 +434,7 @@ def load_case(
     >>> from asperity.case import case_template, load_case
     >>> case = load_case(case_template("line"))
     >>> f"{case.conditions.load:.0f} N, {case.conditions.entrainment_speed} m/s"
-    '500 N, 2.0 m/s'
+    '1000 N, 1.0 m/s'
     """
     if isinstance(source, str) and "\n" in source:
         text, name, folder = source, name or "case", folder or Path()

@@ -108,4 +108,5 @@ def _picture(value: Displayed) -> str:
     image = BytesIO()
     _figure(value).savefig(image, format="png", dpi=110)
     data = b64encode(image.getvalue()).decode("ascii")
-    return f'<img alt="{escape(type(value).__name__)}" src="data:image/png;base64,{data}">'
+    name = escape(type(value).__name__)
+    return f'<img alt="{name}" style="max-width: 100%" src="data:image/png;base64,{data}">'

@@ -14,13 +14,13 @@ from asperity.ehl import ContactSolution, ContactState
 from asperity.machines import MachineResult
 from asperity.monitoring import Track
 from asperity.report.base import Exhibit
-from asperity.report.drawing import display, name_axes
+from asperity.report.drawing import display, group_values, name_axes
 from asperity.report.machine.contact_path import along_path
 from asperity.report.machine.sketch import machine_sketch
 from asperity.report.motion.exhibits import curves as motion_curves
 from asperity.report.run.contact import centre_line, contact_map, film_map, pressure_map
 from asperity.report.study.page import study_exhibits
-from asperity.report.style import ON_PAGE, Medium
+from asperity.report.style import BLUE, ON_PAGE, Medium
 from asperity.report.track.exhibits import amplitude, trend
 from asperity.report.wear.exhibits import curves as wear_curves
 from asperity.results import Run
@@ -29,6 +29,7 @@ from asperity.solution import contact_state
 from asperity.study import StudyOverview, StudyResult
 from asperity.surface import Surface
 
+MAX_LINES = 1000  # of a spectrum that are drawn: the lines of a periodogram scatter by decades
 Draw = Callable[[Medium], Figure]
 
 
@@ -45,7 +46,9 @@ def draw_result(result: object, drawing: str = "") -> Figure:
     if drawing:
         require_choice("drawing", drawing, tuple(drawings))
     with ON_PAGE.drawing():
-        return (drawings[drawing] if drawing else next(iter(drawings.values())))(ON_PAGE)
+        figure = (drawings[drawing] if drawing else next(iter(drawings.values())))(ON_PAGE)
+        figure.draw_without_rendering()  # ticks are created by drawing, in the style of this moment
+    return figure
 
 
 @singledispatch
@@ -112,12 +115,20 @@ def _height_map(surface: Surface, medium: Medium) -> Figure:
     image = axes.imshow(heights, origin="lower", extent=corners, cmap="viridis")
     name_axes(axes, "x_m", "y_m")
     axes.set_title(quantity("sq_m").named(surface.sq))
-    figure.colorbar(image, ax=axes, label=quantity("height_m").axis)
+    label = quantity("height_m").axis
+    figure.colorbar(image, ax=axes, orientation="horizontal", aspect=40, label=label)
     return figure
 
 
 def _density(spectrum: Spectrum, medium: Medium) -> Figure:
     figure, axes = medium.panel(3.5)
-    axes.semilogy(spectrum.frequency_hz[1:], spectrum.density[1:], linewidth=0.9)
+    size = max(1, (spectrum.frequency_hz.size - 1) // MAX_LINES)
+    frequency, density = (
+        group_values(values[1:], size).mean(axis=1)
+        for values in (spectrum.frequency_hz, spectrum.density)
+    )
+    axes.semilogy(frequency, density, linewidth=0.9, color=BLUE)
+    if size > 1:
+        axes.set_title(f"Mean of {size} neighbouring lines")
     axes.set(xlabel="frequency [Hz]", ylabel=f"power spectral density [{spectrum.unit}]")
     return figure
