@@ -1,7 +1,7 @@
 """Results in Python: `repr` of at most 300 characters, a picture in notebooks, `.plot()`."""
 
 import re
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 
 import matplotlib.axes
 import numpy as np
@@ -12,6 +12,7 @@ from asperity.case import case_template, load_case, load_machine
 from asperity.core.displayed import MAX_REPR, Brief, Displayed
 from asperity.core.errors import BadInput
 from asperity.machines import machine_conditions
+from asperity.paper import RigSettings, simulate_rig, write_rig
 from asperity.simulation import run_history, run_wear
 from asperity.study import plan_study, run_study
 
@@ -31,7 +32,10 @@ def results(tmp_path_factory) -> dict[str, object]:
     signal = asp.Signal(noise, rate_hz=2000.0, unit="m/s^2")
     bearing = tmp_path_factory.mktemp("machine") / "bearing.toml"
     bearing.write_text(case_template("bearing"), "utf-8")
+    rig = simulate_rig(RigSettings(samples=8, repeats=1, duration_s=2.0))
+    recordings = write_rig(rig, tmp_path_factory.mktemp("rig"))
     return {
+        "track": asp.track_recordings(recordings),
         "run": run,
         "solution": run.solution,
         "surface": run.solution.surface,
@@ -53,7 +57,7 @@ def test_a_repr_has_at_most_300_characters(results):
     assert "on this grid asperities" in repr(results["run"])
 
 
-DRAWN = ("run", "solution", "surface", "spectrum", "study", "wear", "motion", "machine")
+DRAWN = ("run", "solution", "surface", "spectrum", "study", "wear", "motion", "machine", "track")
 
 
 @pytest.mark.parametrize("name", DRAWN)
@@ -74,6 +78,17 @@ def test_a_notebook_shows_the_numbers_of_a_run(results):
     page = results["run"]._repr_html_()
     for title in ("asperity load share, CLR", "contact resonance frequency, CRF"):
         assert f"<td>{title}</td>" in page
+
+
+def test_a_track_without_a_resonance_shows_its_levels(results):
+    without = tuple(
+        replace(recording, resonance=replace(recording.resonance, found=False))
+        for recording in results["track"].recordings
+    )
+    track = replace(results["track"], recordings=without, stages=None, stages_by={})
+    assert "Trend" not in track.plot().get_title("left")
+    with pytest.raises(BadInput, match="levels"):
+        track.plot("trend")
 
 
 def test_a_drawing_is_chosen_by_name(results):
@@ -98,4 +113,4 @@ def test_every_drawn_class_is_tested(results):
     tested = {type(results[name]) for name in DRAWN}
     names = {name for name in asp.__all__ if isinstance(getattr(asp, name), type)}
     drawn = {getattr(asp, name) for name in names if issubclass(getattr(asp, name), Displayed)}
-    assert {result.__name__ for result in drawn - tested} <= {"Track"}  # test_track_report
+    assert drawn <= tested

@@ -21,7 +21,7 @@ from asperity.report.motion.exhibits import curves as motion_curves
 from asperity.report.run.contact import centre_line, contact_map, film_map, pressure_map
 from asperity.report.study.page import study_exhibits
 from asperity.report.style import BLUE, ON_PAGE, Medium
-from asperity.report.track.exhibits import amplitude, trend
+from asperity.report.track.exhibits import amplitude, levels, trend
 from asperity.report.wear.exhibits import curves as wear_curves
 from asperity.results import Run
 from asperity.simulation import History, WearHistory
@@ -43,6 +43,8 @@ class _Solved(NamedTuple):
 def draw_result(result: object, drawing: str = "") -> Figure:
     """Draw a result by the name of the drawing; the first one by default."""
     drawings = drawings_of(result)
+    if not drawings:
+        raise BadInput(f"this {type(result).__name__} has nothing to draw")
     if drawing:
         require_choice("drawing", drawing, tuple(drawings))
     with ON_PAGE.drawing():
@@ -74,7 +76,9 @@ def _(solution: ContactSolution) -> Mapping[str, Draw]:
 
 @drawings_of.register
 def _(track: Track) -> Mapping[str, Draw]:
-    return _exhibits(trend(track), amplitude(track))
+    resonances = (trend(track), amplitude(track)) if track.resonance_count else ()
+    overall = levels(track)
+    return _exhibits(*resonances, *(() if overall is None else (overall,)))
 
 
 @drawings_of.register
