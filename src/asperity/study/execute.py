@@ -27,7 +27,6 @@ from pathlib import Path
 import pandas
 
 from asperity.core.arrays import Field, usual_float_errors
-from asperity.core.displayed import Displayed
 from asperity.core.errors import AsperityError, BadInput, require_positive
 from asperity.core.files import versions
 from asperity.core.processes import cores, set_up_worker
@@ -70,8 +69,8 @@ class StudyProgress:
         return (self.total - self.kept - self.done) / self.rate if self.done else None
 
 
-@dataclass(frozen=True, repr=False)
-class StudyResult(Displayed):
+@dataclass(frozen=True)
+class StudyResult:
     """A study: its plan and one row per finished case, in the order of the plan."""
 
     plan: StudyPlan
