@@ -146,7 +146,7 @@ class DisturbedWatch:
 
 
 def memory_mb(process: int) -> float:
-    """Return the memory of a process and its children [MB], where the system tells it."""
+    """Return the memory of a process and its children [MB], as Linux reports it."""
     status = Path(f"/proc/{process}/status").read_text()
     own = next(line for line in status.splitlines() if line.startswith("VmRSS"))
     children = Path(f"/proc/{process}/task/{process}/children").read_text().split()

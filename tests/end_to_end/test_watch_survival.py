@@ -71,7 +71,7 @@ def watch(tmp_path, **changes):
     store = changes.pop("store", tmp_path / "out/asperity.db")
     return open_watch(
         (tmp_path / "in").resolve(),
-        database.Store(store, patient=not changes.get("once")),
+        database.Store(store, allow_unavailable=not changes.get("once")),
         TrackSettings(**changes.pop("tracking", {})),
         WatchSettings(**{"poll_interval_s": 0.0, "settle_time_s": 0.0} | changes),
     )

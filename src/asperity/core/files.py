@@ -42,7 +42,7 @@ def atomic_write(path: Path) -> Iterator[Path]:
 def new_part(path: Path) -> Iterator[Path]:
     """Yield a new, empty file beside `path`, with its permissions; remove it if it is still there.
 
-    Its name cannot be foretold, and a link of that name is not followed.
+    Its name cannot be predicted, and a link of that name is not followed.
     """
     part = path.with_name(f".{path.name[:MAX_NAME]}.{os.urandom(8).hex()}.part")
     os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))

@@ -19,7 +19,7 @@ from asperity.monitoring.forecast import FORECAST
 from asperity.monitoring.operating_point import CRF, USUAL_OIL, conditions_of
 from asperity.monitoring.recording import TrackedRecording
 from asperity.monitoring.target import Target
-from asperity.trend import Alarm
+from asperity.trend import ALERT_FACTOR, Alarm
 
 UNSEEN = 3  # last recordings without a resonance from which the contact is not seen
 ORIGIN_REMEDY = "state load or speed, a second sensor, or the case of the contact"
@@ -30,7 +30,6 @@ STANDARD_ERRORS = 4.0  # that an exponent is away from 0
 MIN_INTERVALS = 8  # intervals between arrivals from which the usual one is known
 OVERDUE_FACTOR = 5.0  # usual intervals without a recording until it is overdue
 MIN_WAIT_S = 60.0
-RISEN = 2.0  # factor over its baseline from which the depth of an envelope names a fault
 COMPONENTS = {
     "BPFO": "outer race",
     "BPFI": "inner race",
@@ -92,7 +91,7 @@ def fault_state(alarm: Alarm) -> JsonObject | None:
     if not depths or alarm.state not in ("alert", "alarm") or not raised:
         return None
     highest, *others = depths
-    risen = highest.factor >= RISEN
+    risen = highest.factor >= ALERT_FACTOR
     name = highest.fault_frequency
     return {
         "component": _component(name) if risen else None,
@@ -123,8 +122,8 @@ def fault_sentence(fault: JsonObject | None) -> str:
     if fault["component"] is None:
         return f"No fault frequency has risen: the envelope at {name}, the highest, is {factor}."
     on = f" on {fault['sensor']}" if fault["sensor"] else ""
-    beside = ", ".join(f"{other} {by:.2g}" for other, by in others.items())
-    compared = f"; {beside} times theirs" if beside else ""
+    beside = ", ".join(f"{other} {by:.2g} times" for other, by in others.items())
+    compared = f" (others: {beside})" if beside else ""
     return (
         f"Indicates a fault of the {fault['component']}: the envelope at {name}{on} has a depth of "
         f"{fault['depth']:.2g}, {factor}{compared}."

@@ -122,7 +122,7 @@ def watch_tree(
 def _open_store(out: Path, watching: WatchSettings) -> Store:
     """Return the store of a watch, which may be written later, such as after a full disk."""
     make_folder(out)
-    return Store(watching.store or out / STORE, patient=not watching.once)
+    return Store(watching.store or out / STORE, allow_unavailable=not watching.once)
 
 
 def _checked(folder: str | Path, watching: WatchSettings) -> Path:

@@ -61,14 +61,14 @@ def _searched(tracked: "Track") -> Block:
         ("method", tracked.method),
         *tracked.stage_rows(),
         ("alarm", tracked.alarm.verdict),
-        *fault_rows(tracked),
+        *_fault_rows(tracked),
         *_states_rows(tracked),
         ("severity, last recording", tracked.recordings[-1].severity()),
     ]
     yield from table(rows, (*tracked.problems, *tracked.notes))
 
 
-def fault_rows(tracked: "Track") -> list[Row]:
+def _fault_rows(tracked: "Track") -> list[Row]:
     """Return a row of the fault that an alert or alarm indicates; none without one."""
     sentence = tracked.fault_sentence()
     return [("fault", sentence)] if sentence else []

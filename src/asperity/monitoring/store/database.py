@@ -131,8 +131,8 @@ class StoredRecording(NamedTuple):
 class Store:
     """Store of recordings and judgements; created if the file does not exist.
 
-    With `patient`, a file that cannot be used at present is read only, or replaced by an empty
-    store in memory, until `recover` succeeds.
+    With `allow_unavailable`, a file that cannot be used at present is opened for reading only, or
+    replaced by an empty store in memory, until `recover` succeeds.
 
     Raises
     ------
@@ -141,7 +141,7 @@ class Store:
     UnreadableFile
         if the file is not a store, or of a later version.
     StoreUnavailable
-        if the file cannot be used at present, unless `patient`.
+        if the file cannot be used at present, unless `allow_unavailable`.
     """
 
     def __init__(
@@ -150,7 +150,7 @@ class Store:
         *,
         make: bool = True,
         in_memory: bool = False,
-        patient: bool = False,
+        allow_unavailable: bool = False,
     ) -> None:
         self.path = Path(path)
         self._in_memory = in_memory
@@ -161,11 +161,11 @@ class Store:
         try:
             self._open()
         except StoreUnavailable as error:
-            if not patient:
+            if not allow_unavailable:
                 raise
             self._open_provisionally(error)
         except BadInput as error:
-            if not (patient and self.path.is_file()):
+            if not (allow_unavailable and self.path.is_file()):
                 raise
             self._open_provisionally(StoreUnavailable(str(error)))
 
