@@ -6,6 +6,7 @@ import re
 import shlex
 import shutil
 from contextlib import redirect_stdout
+from pathlib import Path
 
 import pytest
 
@@ -50,8 +51,21 @@ def test_the_first_commands_print_the_verdict_shown(asp):
     assert asp(*shlex.split(report)[1:])[0] == 0
 
 
+def test_five_lines_of_python_print_the_verdict_and_draw_the_film(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(ROOT / "examples", "examples")
+    block, _ = (block for block in README.blocks if block.language == "python")
+    assert len([line for line in block.text.splitlines() if line]) <= 5
+    verdict = next(block.text for block in README.blocks if block.text.startswith("Mixed lubr"))
+    printed = io.StringIO()
+    with redirect_stdout(printed):
+        exec(compile(block.text, "README.md", "exec"), {})
+    assert matches(printed.getvalue().strip(), verdict.strip())
+    assert Path("film.png").read_bytes().startswith(b"\x89PNG")
+
+
 def test_the_python_example_prints_the_output_shown():
-    (block,) = (block for block in README.blocks if block.language == "python")
+    _, block = (block for block in README.blocks if block.language == "python")
     after = next(
         line.text
         for line in README.prose

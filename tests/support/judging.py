@@ -39,6 +39,7 @@ FREE = {
     "Path",
     "Annotated",
 }  # names without a definition in the package
+FIGURE_METHODS = {"savefig"}  # of a matplotlib figure, which `plot` of a result returns
 OTHER_TOOLS = ("--nthreads", "-n")  # options of dask workers and of pytest
 
 
@@ -393,6 +394,7 @@ def wrong_in_block(node: ast.AST, bound: set[str]) -> str | None:
     if isinstance(node, ast.Attribute):
         head = ast.unparse(node).partition(".")[0]
         if (head in bound and head not in FREE) or not head.isidentifier():
-            return None if vocabulary().is_name(node.attr) else f"no object has {node.attr}"
+            known = node.attr in FIGURE_METHODS or vocabulary().is_name(node.attr)
+            return None if known else f"no object has {node.attr}"
     named = isinstance(node, ast.Constant) or (isinstance(node, ast.Name) and node.id in bound)
     return None if named else wrong_node(node)

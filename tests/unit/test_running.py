@@ -89,6 +89,8 @@ def test_the_note_on_too_little_load_is_for_standing_roughness_only():
         "contact.load": "500 N",
         "contact.entrainment_speed": "0.3 m/s",
         "contact.slip": 0.0,
+        "lubricant.viscosity.eta0": "0.08 Pa s",
+        "lubricant.viscosity.alpha": "20 1/GPa",
         "surface.sq": "0.45 um",
         "surface.correlation_length": ["36 um", "72 um"],
         "grid.cells": [48, 24],

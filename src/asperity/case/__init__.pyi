@@ -28,8 +28,10 @@ from .study import Seeding as Seeding
 from .study import StudyKind as StudyKind
 from .study import StudySection as StudySection
 from .surfaces import SurfaceSection as SurfaceSection
+from .templates import COMMANDS as COMMANDS
 from .templates import KINDS as KINDS
 from .templates import case_template as case_template
+from .templates import write_template as write_template
 from .text import relative_path as relative_path
 from .units import Length as Length
 from .units import read_amount as read_amount

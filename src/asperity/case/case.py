@@ -19,6 +19,7 @@ from asperity.case.units import numbers_in_si, plain
 from asperity.case.vibration import vibration_model
 from asperity.contact.conditions import ContactConditions, ElasticPair
 from asperity.contact.grid import Grid
+from asperity.core.displayed import Brief
 from asperity.core.errors import BadInput, UnreadableFile
 from asperity.core.limits import require_affordable
 from asperity.coupling import VibrationModel
@@ -40,8 +41,8 @@ FINE_GRID = 256 * 256  # cells above which a grid counts as fine
 CELL_BYTES, CELL_S = 800.0, 1e-4  # cost of a cell while a contact is solved
 
 
-@dataclass(frozen=True)
-class Case:
+@dataclass(frozen=True, repr=False)
+class Case(Brief):
     """Contact to solve, as its case file states it; created by `load_case`.
 
     `contents` are the file's tables, `folder` is the base of surface files, `source` the name of
@@ -433,7 +434,7 @@ def load_case(
     >>> from asperity.case import case_template, load_case
     >>> case = load_case(case_template("line"))
     >>> f"{case.conditions.load:.0f} N, {case.conditions.entrainment_speed} m/s"
-    '500 N, 2.0 m/s'
+    '1000 N, 1.0 m/s'
     """
     if isinstance(source, str) and "\n" in source:
         text, name, folder = source, name or "case", folder or Path()

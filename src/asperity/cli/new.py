@@ -7,10 +7,7 @@ import typer
 
 from asperity import case
 from asperity.cli.app import app
-from asperity.core import files
 from asperity.core.errors import BadInput, require_choice
-
-NEXT = {"wear": "wear {} --hours 1"}  # next command by kind of case; default: solve
 
 
 @app.command()
@@ -19,7 +16,8 @@ def new(
         str,
         typer.Argument(
             metavar="KIND",
-            help="line, point, elliptic, roller, dry, measured, motion, study or wear.",
+            help="A contact: line, point, elliptic, roller, dry, measured. A machine: gear, "
+            "bearing, cam. A task: motion, study, wear, track, infer.",
         ),
     ],
     out: Annotated[
@@ -31,6 +29,8 @@ def new(
     path = out or Path(f"{kind}.toml")
     if path.exists():
         raise BadInput(f"{path} exists already; name another file with --out")
-    files.write_text(path, case.case_template(kind))
-    following = NEXT.get(kind, "solve {}").format(path)
-    print(f"{path}: template of a case. Try next: asperity {following}")
+    for written in case.write_template(kind, path):
+        print(f"Wrote {written}")
+    print("Try next:")
+    for command in case.COMMANDS[kind]:
+        print(f"  asperity {command.format(case=path, name=path.stem)}")

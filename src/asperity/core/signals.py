@@ -10,6 +10,7 @@ import numpy as np
 import scipy
 
 from asperity.core.arrays import Field, Mask, usual_float_errors
+from asperity.core.displayed import Brief, Displayed
 from asperity.core.errors import BadInput, require_positive
 
 OVERLAP = 0.5  # of successive segments, over their length; a boxcar has none
@@ -17,8 +18,8 @@ FFT_BATCH_SAMPLES = 1 << 18  # transformed together, so that they fit the proces
 FILTER_BLOCK_SAMPLES = 1 << 15  # filtered together
 
 
-@dataclass(frozen=True, slots=True)
-class Signal:
+@dataclass(frozen=True, slots=True, repr=False)
+class Signal(Brief):
     """Uniformly sampled values.
 
     `values` has shape (samples,), in `unit` (an SI unit in pint's notation, such as "m/s^2");
@@ -52,8 +53,8 @@ class Signal:
         return self.values.size / self.rate_hz
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Spectrum:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Spectrum(Displayed):
     """One-sided power spectral density and its estimation settings.
 
     Parameters

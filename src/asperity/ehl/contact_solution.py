@@ -12,6 +12,7 @@ import numpy as np
 from asperity.contact.conditions import ContactConditions
 from asperity.contact.grid import Grid
 from asperity.core.arrays import Field, Mask
+from asperity.core.displayed import Displayed
 from asperity.core.errors import BadInput
 from asperity.core.files import versions
 from asperity.core.quantities import quantity
@@ -105,8 +106,8 @@ class Oil:
     growth: Field
 
 
-@dataclass(frozen=True, kw_only=True)
-class ContactSolution:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ContactSolution(Displayed):
     """A solved contact.
 
     `pressure` [Pa], `gap` [m] between the deformed surfaces and `in_contact` have shape (nx, ny) on

@@ -69,7 +69,7 @@ def film_numbers(conditions: ContactConditions, lubricant: Lubricant) -> FilmNum
     >>> contact = load_case(case_template("line"))
     >>> numbers = film_numbers(contact.conditions, contact.lubricant)
     >>> f"M {numbers.moes_load:.0f}, L {numbers.moes_oil:.1f}"
-    'M 2, L 15.6'
+    'M 10, L 9.2'
     """
     radius = conditions.radius_along_rolling
     modulus = conditions.pair.effective_modulus
@@ -103,7 +103,7 @@ def lubrication_regime(conditions: ContactConditions, lubricant: Lubricant) -> R
     >>> from asperity.ehl import lubrication_regime
     >>> contact = load_case(case_template("line"))
     >>> lubrication_regime(contact.conditions, contact.lubricant)
-    'piezoviscous-rigid'
+    'piezoviscous-elastic'
     """
     films = {regime: fit.film for regime, fit in least_films(conditions, lubricant).items()}
     thin = max(films["isoviscous-rigid"], films["isoviscous-elastic"])

@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields
 from enum import StrEnum
 from typing import Literal, get_args
 
+from asperity.core.displayed import Brief
 from asperity.core.errors import BadInput, require_positive
 from asperity.ehl.uncertainty import ContactError
 
@@ -195,8 +196,8 @@ class Convergence:
         )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ContactState:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class ContactState(Brief):
     """Scalars of a solved contact, SI.
 
     The Hertz zone is |x| <= a for a line contact, the ellipse of half-widths a, b for others.

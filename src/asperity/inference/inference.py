@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from asperity.core.arrays import Field
+from asperity.core.displayed import Brief
 from asperity.core.documents import JsonObject
 from asperity.core.quantities import quantity
 from asperity.inference.emulator import Emulator
@@ -72,8 +73,8 @@ class PointEstimates:
         }
 
 
-@dataclass(frozen=True)
-class Inference:
+@dataclass(frozen=True, repr=False)
+class Inference(Brief):
     """Posterior of a contact's state. Made by `infer_contact`.
 
     Parameters

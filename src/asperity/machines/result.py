@@ -8,6 +8,7 @@ from typing import Any, TypeAlias
 
 from asperity.case import MachineCase
 from asperity.contact.materials import material
+from asperity.core.displayed import Displayed
 from asperity.core.quantities import quantity
 from asperity.machine import BallBearing, CylindricalRollerBearing, MachineContact
 from asperity.machines.fatigue_ratings import DangVan, dang_van_below
@@ -23,8 +24,8 @@ Row: TypeAlias = dict[str, Any]  # conditions and numbers of a contact by key
 VERDICT_RATINGS = ("viscosity_ratio", "life_factor", "rated_film", "scuffing_margin_k")
 
 
-@dataclass(frozen=True)
-class MachineResult:
+@dataclass(frozen=True, repr=False)
+class MachineResult(Displayed):
     """A machine's contacts, one row each, stored in `folder`; solved numbers if they were solved.
 
     `run` is the worst contact with its fields, if loaded.

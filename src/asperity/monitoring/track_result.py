@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asperity.core.arrays import finite_or_none
+from asperity.core.displayed import Displayed
 from asperity.core.documents import JsonObject
 from asperity.core.errors import BadInput
 from asperity.core.files import atomic_write, write_csv
@@ -59,8 +60,8 @@ TEXTS = ("file", "reason", "damping_reason", "label", "started")
 SUFFIXES = (".csv", ".parquet", ".nc")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Track:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Track(Displayed):
     """A judged series of recordings.
 
     `recordings` are ordered by `x`, named `x_name`. `stages` follow from CRF, damping or both, as

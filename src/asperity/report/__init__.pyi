@@ -2,6 +2,7 @@ from .benchmark import benchmark_figure as benchmark_figure
 from .inference.page import write_inference_report as write_inference_report
 from .machine.page import write_machine_report as write_machine_report
 from .motion.page import write_motion_report as write_motion_report
+from .plots import draw_result as draw_result
 from .run.curves import friction_figure as friction_figure
 from .run.page import write_report as write_report
 from .run.surface import surface_map as surface_map

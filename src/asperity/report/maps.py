@@ -33,14 +33,15 @@ from asperity.report.style import (
 
 def map_figure(medium: Medium, extent: tuple[float, float]) -> tuple[Figure, Axes]:
     """Create a figure for a map of this extent, with room for a legend below."""
-    width = medium.single - 0.85
+    left = 0.76  # for numbers of four characters and the label beside them
+    width = medium.single - left - 0.21
     below = 1.0
     above = 0.32
     height = width * min(max(extent[1] / extent[0], 0.15), 1.4)
     total = below + height + above
     figure = Figure(figsize=(medium.single, total))
     return figure, figure.add_axes(
-        (0.64 / medium.single, below / total, width / medium.single, height / total)
+        (left / medium.single, below / total, width / medium.single, height / total)
     )
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from asperity import ehl
 from asperity.case import Case
+from asperity.core.displayed import Displayed
 from asperity.core.errors import BadInput
 from asperity.core.quantities import Quantity, lines, quantity, read
 from asperity.coupling import Vibration
@@ -69,8 +70,8 @@ ROUGHNESS_KEYS = ("lambda_ratio", "rms_slope")
 SUMMARY_KEYS = ("clr", "clr_error", "car", *ROUGHNESS_KEYS, "crf_hz", "crf_std_hz")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Run:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Run(Displayed):
     """Solved case: the contact, its derived quantities, and the vibration of a mass on it.
 
     `vibration` is None for a case without [vibration]; `notes` qualify the numbers. Friction, heat

@@ -66,7 +66,8 @@ class RegimeCard:
     dimensionless numbers, the regime, and the film formulas valid there; the last three are None or
     empty for a dry contact. `fits` is also empty for a contact narrower across rolling than along
     it, which no formula covers. Then the film ratio, and Sdq of the roughness in the Hertz zone, on
-    which CLR depends more.
+    which CLR depends more. `comparable` is False if roughness affects the film: the formulas hold
+    for smooth bodies.
     """
 
     half_width: float
@@ -78,6 +79,7 @@ class RegimeCard:
     fits: tuple[FittedFilm, ...]
     lambda_ratio: float | None
     rms_slope: float
+    comparable: bool
 
     def to_dict(self) -> dict[str, Any]:
         """Return the card as a dictionary for JSON in SI units; None if undefined."""
@@ -135,17 +137,18 @@ class RegimeCard:
             return rows
         numbers = ", ".join(quantity(key).named(values[key]) for key in _NUMBERS)
         rows += [("regime", str(self.regime)), ("dimensionless numbers", numbers)]
-        film = quantity("film_thickness_m")
-        deviation = quantity("film_deviation")
-        rows += [
-            (
-                f"fitted {quantity(_PLACES[fit.place]).name}, {fit.source}",
-                f"{film.text(fit.film)}; solved {film.text(fit.solved)}, "
-                f"{deviation.text(fit.deviation)}",
-            )
+        return rows + [
+            (f"fitted {quantity(_PLACES[fit.place]).name}, {fit.source}", self._fitted(fit))
             for fit in self.fits
         ]
-        return rows
+
+    def _fitted(self, fit: FittedFilm) -> str:
+        """Return a fitted film, beside the solved one where they are comparable."""
+        film = quantity("film_thickness_m")
+        if not self.comparable:
+            return f"{film.text(fit.film)}, of smooth bodies"
+        deviation = quantity("film_deviation").text(fit.deviation)
+        return f"{film.text(fit.film)}; solved {film.text(fit.solved)}, {deviation}"
 
 
 def regime_card(solution: ContactSolution) -> RegimeCard:
@@ -168,6 +171,7 @@ def regime_card(solution: ContactSolution) -> RegimeCard:
         regime=regime,
         lambda_ratio=film_ratio(solution),
         rms_slope=rms_slope(solution),
+        comparable=_full_film(solution),
         fits=()
         if lubricant is None
         else tuple(
@@ -196,15 +200,19 @@ def film_ratio(solution: ContactSolution) -> float | None:
     return least_film(solution.conditions, oil) / sq if oil and sq > 0.0 else None
 
 
+def _full_film(solution: ContactSolution) -> bool:
+    """Return True if the oil carries all load on a film that roughness does not affect."""
+    ratio = film_ratio(solution)
+    return not solution.in_contact.any() and (ratio is None or ratio >= FULL_FILM)
+
+
 def far_from_fits(solution: ContactSolution) -> str | None:
     """Return a note if the central film without asperity contact is far from all valid fits."""
     conditions = solution.conditions
     lubricant = solution.lubricant
-    sq = solution.surface.sq
     if (
         lubricant is None
-        or solution.in_contact.any()
-        or least_film(conditions, lubricant) < FULL_FILM * sq
+        or not _full_film(solution)
         or loss_beyond_body(conditions, lubricant) > MAX_DEVIATION
     ):
         return None

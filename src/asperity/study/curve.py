@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from asperity.case import Case
 from asperity.core.arrays import Field, usual_float_errors
 from asperity.core.coverage import COVERAGE
+from asperity.core.displayed import Brief
 from asperity.core.errors import BadInput, require_positive
 from asperity.study.evaluate import BOTH_PRESETS, DONE
 from asperity.study.execute import StudyProgress, StudyResult, run_study
@@ -22,8 +23,8 @@ from asperity.trend import StageErrors, Stages, split_stages
 SQ_KEY = "surface.sq"
 
 
-@dataclass(frozen=True)
-class WearCurve:
+@dataclass(frozen=True, repr=False)
+class WearCurve(Brief):
     """Load sharing and contact resonance over roughness.
 
     Parameters

@@ -27,6 +27,7 @@ from pathlib import Path
 import pandas
 
 from asperity.core.arrays import Field, usual_float_errors
+from asperity.core.displayed import Displayed
 from asperity.core.errors import AsperityError, BadInput, require_positive
 from asperity.core.files import versions
 from asperity.core.processes import cores, set_up_worker
@@ -69,8 +70,8 @@ class StudyProgress:
         return (self.total - self.kept - self.done) / self.rate if self.done else None
 
 
-@dataclass(frozen=True)
-class StudyResult:
+@dataclass(frozen=True, repr=False)
+class StudyResult(Displayed):
     """A study: its plan and one row per finished case, in the order of the plan."""
 
     plan: StudyPlan

@@ -7,6 +7,7 @@ import numpy as np
 
 from asperity.contact.grid import Grid
 from asperity.core.arrays import Field, real_array
+from asperity.core.displayed import Displayed
 from asperity.core.errors import BadInput, require_positive
 
 UNKNOWN_LENGTH = "unknown"  # as text, of a length that is not finite
@@ -43,8 +44,8 @@ def _require_finite(heights: Field) -> None:
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Surface:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Surface(Displayed):
     """Composite roughness: heights [m], shape (nx, ny), x along rolling, positive towards material.
 
     Raises

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from asperity.core.arrays import Field, usual_float_errors
 from asperity.core.coverage import QUANTILES
+from asperity.core.displayed import Brief
 from asperity.core.errors import BadInput, require_choice
 from asperity.trend.change_points import (
     FEWEST_STAGE_POINTS,
@@ -57,8 +58,8 @@ class StageErrors:
 NO_ERRORS = StageErrors()
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Stages:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Stages(Brief):
     """Stages of wear in a series of CRFs, damping ratios, or both.
 
     Parameters

@@ -9,6 +9,7 @@ import numpy as np
 import pandas
 
 from asperity.core.arrays import Field, finite_or_none
+from asperity.core.displayed import Brief
 from asperity.core.documents import JsonObject
 from asperity.core.errors import BadInput
 from asperity.core.files import write_csv
@@ -27,8 +28,8 @@ NO_SPECTRUM = "overall values have no spectrum"
 DECIBEL = np.log(10.0) / 20.0  # of an amplitude
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OverallTrack:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class OverallTrack(Brief):
     """Judged overall values: the state after each row, and how the last one came about.
 
     `since` is the row with which the present state began, None for "none". `acknowledged` counts

@@ -1,5 +1,7 @@
 """Exhibits of a solved contact: maps, section along rolling, height distribution, convergence."""
 
+from typing import Protocol
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -7,7 +9,7 @@ from matplotlib.figure import Figure
 from asperity.contact.hertz import line_pressure
 from asperity.core.arrays import Field
 from asperity.core.quantities import quantity
-from asperity.ehl import ContactSolution, Convergence, hertz_zone
+from asperity.ehl import ContactSolution, ContactState, Convergence, hertz_zone
 from asperity.report.base import Exhibit
 from asperity.report.drawing import display, legend_below, name_axes, one_panel
 from asperity.report.maps import (
@@ -29,6 +31,20 @@ from asperity.report.style import (
     Style,
 )
 from asperity.results import Run
+
+
+class Solved(Protocol):
+    """Solved contact with its state: a run, or a solution beside its state."""
+
+    @property
+    def solution(self) -> ContactSolution:
+        """Fields of the contact."""
+        ...
+
+    @property
+    def state(self) -> ContactState:
+        """Numbers of the contact."""
+        ...
 
 
 def contact_map(run: Run) -> Exhibit:
@@ -63,7 +79,7 @@ def contact_map(run: Run) -> Exhibit:
     )
 
 
-def film_map(run: Run) -> Exhibit:
+def film_map(run: Solved) -> Exhibit:
     """Map the gap between the deformed surfaces; colours end at the 99th percentile."""
     solution, state = run.solution, run.state
     zone = hertz_zone(solution.conditions, solution.grid)
@@ -87,7 +103,7 @@ def film_map(run: Run) -> Exhibit:
     )
 
 
-def pressure_map(run: Run) -> Exhibit:
+def pressure_map(run: Solved) -> Exhibit:
     """Map the total pressure of oil and asperities."""
     solution = run.solution
     pressure = quantity("pressure")
@@ -108,7 +124,7 @@ def pressure_map(run: Run) -> Exhibit:
     )
 
 
-def centre_line(run: Run) -> Exhibit:
+def centre_line(run: Solved) -> Exhibit:
     """Draw pressure and gap along rolling in the row of cells nearest y = 0."""
     solution = run.solution
 

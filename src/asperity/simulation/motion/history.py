@@ -11,6 +11,7 @@ import pandas
 
 from asperity.case import Case
 from asperity.core.arrays import Field, Mask, finite_or_none
+from asperity.core.displayed import Displayed
 from asperity.core.quantities import quantity
 from asperity.coupling import Vibration, contact_vibration
 from asperity.ehl import ContactState
@@ -55,8 +56,8 @@ class MotionFrame(NamedTuple):
     in_contact: Mask
 
 
-@dataclass(frozen=True, kw_only=True)
-class History:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class History(Displayed):
     """Moving contact over time.
 
     `table` has a row per step, step 0 being the start: `step`, `heat_j` (friction's and the flow's,

@@ -14,6 +14,7 @@ import scipy
 from asperity.case import Case
 from asperity.core.arrays import finite_or_none
 from asperity.core.coverage import UPPER
+from asperity.core.displayed import Displayed
 from asperity.core.documents import JsonObject
 from asperity.core.errors import BadInput
 from asperity.core.quantities import quantity
@@ -48,8 +49,8 @@ class WearDrift(NamedTuple):
     high: float
 
 
-@dataclass(frozen=True, kw_only=True)
-class WearHistory:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class WearHistory(Displayed):
     """Wear of a contact over hours.
 
     `table` has a row per jump, with the contact at its beginning, and one for the end;
