@@ -2,6 +2,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+BASE := $(VENV)/.base
 READY := $(VENV)/.ready
 
 # a process runs whole files, so that it prepares what their tests share once; tests/conftest.py puts slow files first
@@ -10,7 +11,7 @@ BY_FILE := --dist loadfile --no-loadscope-reorder
 .PHONY: demo test quick check bench docs installed release attacks clean
 .DEFAULT_GOAL := demo
 
-demo: $(READY)
+demo: $(BASE)
 	$(BIN)/asperity demo
 
 test: $(READY)
@@ -48,15 +49,22 @@ docs: $(READY)
 clean:
 	rm -rf $(VENV)
 
-$(READY): pyproject.toml constraints.txt
+INSTALL := $(if $(shell command -v uv),uv pip install --python $(BIN)/python,$(BIN)/python -m pip install) --quiet --constraint constraints.txt
+
+# the package alone, which the demo needs
+$(BASE): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "asperity needs Python 3.11 or newer; point PYTHON=... at one"; exit 1; }
-	@echo "Setting up $(VENV) (once; a minute or two) ..."
+	@echo "Setting up $(VENV) (once; about a minute) ..."
 	@if command -v uv >/dev/null 2>&1; then \
-	  uv venv --quiet --clear --python "$(PYTHON)" $(VENV) && \
-	  uv pip install --quiet --python $(BIN)/python --constraint constraints.txt --editable '.[recordings,study,page,infer,monitor]' --group dev --group docs; \
+	  uv venv --quiet --clear --python "$(PYTHON)" $(VENV); \
 	else \
-	  $(PYTHON) -m venv --clear $(VENV) && \
-	  $(BIN)/python -m pip install --quiet --constraint constraints.txt 'pip>=25.1' && \
-	  $(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[recordings,study,page,infer,monitor]' --group dev --group docs; \
+	  $(PYTHON) -m venv --clear $(VENV) && $(INSTALL) 'pip>=25.1'; \
 	fi
+	@$(INSTALL) --editable .
+	@touch $(BASE)
+
+# with extras, and what tests and docs need
+$(READY): $(BASE)
+	@echo "Adding extras and developers' packages to $(VENV) (once; a minute or two) ..."
+	@$(INSTALL) --editable '.[recordings,study,page,infer,monitor]' --group dev --group docs
 	@touch $(READY)

@@ -14,7 +14,7 @@ MOST = 60  # limit of CPU time [s]
 
 def lines(*, fast: bool) -> Iterator[str]:  # noqa: ARG001 - short already
     """Yield one row per script."""
-    scripts = sorted(SCRIPTS.glob("[0-9]*.py"))
+    scripts = sorted(SCRIPTS.rglob("[0-9]*.py"), key=lambda path: path.name)
     yield "## Gallery scripts"
     yield ""
     yield f"CPU time of a complete script, with imports; limit {MOST} s."

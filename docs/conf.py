@@ -67,6 +67,10 @@ html_sidebars = {"index": []}
 sphinx_gallery_conf = {
     "examples_dirs": "scripts",
     "gallery_dirs": "gallery",
+    "subsection_order": [
+        f"scripts/{name}" for name in ("film", "roughness", "friction", "machines", "wear")
+    ],
+    "thumbnail_size": (480, 336),
     "filename_pattern": r"/\d\d_",
     "within_subsection_order": "FileNameSortKey",
     "show_memory": False,

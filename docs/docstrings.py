@@ -81,6 +81,8 @@ def styled(_gallery: dict[str, Any], _script: str) -> None:
         "axes.spines.top": False,
         "axes.spines.right": False,
         "axes.titlesize": "medium",
+        "font.size": 13,  # readable in the thumbnails
+        "legend.fontsize": "small",
         "legend.frameon": False,
         "lines.markersize": 5,
         "image.interpolation": "nearest",

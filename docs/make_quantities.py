@@ -5,7 +5,7 @@ from pathlib import Path
 from asperity.core.quantities import Quantity, catalogue
 
 PAGE = Path(__file__).with_name("quantities.md")
-OPENING = """# Quantities
+OPENING = """# Quantities: results and their units
 
 All numbers that asperity reports. \
 The key is the same in `--json`, tables and files, whose values have this unit; \

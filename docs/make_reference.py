@@ -108,7 +108,7 @@ def commands_page() -> str:
 
 
 def _usage(entry: Any) -> str:
-    name = entry.metavar or entry.name.upper()
+    name = (entry.metavar or entry.name.upper()) + ("..." if entry.nargs == -1 else "")
     return name if entry.required else f"[{name}]"
 
 

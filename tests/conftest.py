@@ -3,6 +3,7 @@
 """
 
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -10,9 +11,17 @@ import pytest
 # Every core runs a test already; several threads of BLAS per process would wait for one another
 # and take three times the processor time. Read when numpy is loaded, here and in child processes.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.pop("COLUMNS", None)  # of the parallel runner's terminal; output would wrap to it
 
 HERE = Path(__file__).parent
 SLOW = set((HERE / "slow.txt").read_text("utf-8").split())  # files of more than about 10 s
+
+
+@pytest.fixture(autouse=True)
+def _without_log_lines(monkeypatch):
+    """Print no lines of progress in this process; their times depend on the load of the machine."""
+    if (output := sys.modules.get("asperity.cli.output")) is not None:
+        monkeypatch.setattr(output, "FIRST_LINE_S", 1e6)
 
 
 @pytest.fixture

@@ -1,5 +1,6 @@
 """Bad input of every kind: exit code 2, one sentence that names the value, and no file written."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +27,10 @@ def refused(tmp_path, monkeypatch, capsys):
             main(arguments)
         captured = capsys.readouterr()
         assert end.value.code == 2
-        assert captured.out == ""
+        if "--json" in arguments:
+            assert list(json.loads(captured.out)) == ["error"]
+        else:
+            assert captured.out == ""
         assert captured.err.startswith("error: ")
         assert captured.err.count("\n") == 1
         assert sorted(tmp_path.rglob("*")) == before

@@ -1,5 +1,6 @@
 """`asperity stribeck` and `asperity traction` from the command line and from Python."""
 
+import csv
 import json
 from itertools import pairwise
 from pathlib import Path
@@ -60,6 +61,8 @@ def test_traction_rises_from_zero_to_its_limit(asp):
         *slips,
         "--out",
         "curve.png",
+        "--out",
+        "curve.csv",
     )
     assert code == 0
     first, second = out.splitlines()[:2]
@@ -68,6 +71,10 @@ def test_traction_rises_from_zero_to_its_limit(asp):
     assert out.count("1.91") == 8
     assert "thermal.feedback=true" in out  # the film is hot at 300 % sliding
     assert Path("curve.png").read_bytes().startswith(PNG)
+    with Path("curve.csv").open(encoding="utf-8", newline="") as table:
+        points = list(csv.DictReader(table))
+    assert [point["slide_to_roll"] for point in points] == ["0.0", "0.001", "0.3", "3.0"] * 2
+    assert sorted({point["sq_m"] for point in points}) == ["1e-06", "5e-07"]
 
 
 def test_a_traction_curve_of_running_roughness_depends_on_its_speed(case):
@@ -126,7 +133,10 @@ def test_points_that_do_not_converge_are_marked_and_fail_the_command(asp):
             "contact.slip is 0, so that nothing slides",
         ),
         (("stribeck", "case.toml", "--speed", "-1"), "entrainment speed must be positive"),
-        (("stribeck", "case.toml", "--out", "curve.pdf"), "must be a file that ends in .png"),
+        (
+            ("stribeck", "case.toml", "--out", "curve.svg"),
+            "must be a file that ends in .csv, .png or .pdf",
+        ),
         (("stribeck", "case.toml", "--sq", "1 kg"), "surface.sq must be a length"),
         (
             ("traction", "case.toml", "--slip", "-0.1"),

@@ -152,9 +152,10 @@ def test_noise_gives_no_estimate(asp, small):
         "--emulator",
         str(folder),
     )
-    code, out, err = asp(*command, "--json", "--report", "page.html")
+    code, out, err = asp(*command, "--json", "--report", "page.html", "--figures", "figures")
     assert (code, err) == (0, "")
     result = json.loads(out)
+    assert len(list(Path(result["figures"]).glob("*-85mm.pdf"))) >= 3
     assert result["verdict"].startswith("Not identified: no recording shows a contact resonance")
     assert result["identifiable"] is False
     assert len(result["silent"]) == 2

@@ -109,6 +109,14 @@ def test_a_dry_run_gives_only_the_conditions(asp, name, contacts, worst, frequen
     assert list(Path().glob("*")) == list(Path().glob("*.toml"))
 
 
+def test_the_drawing_of_a_machine_is_written_as_a_figure(asp):
+    code, out, _ = asp("machine", "6206.toml", "--dry-run", "--figures", "figures", "--json")
+    assert (code, json.loads(out)["figures"]) == (0, "figures")
+    assert {"machine-85mm.pdf", "machine-175mm.pdf", "captions.md"} <= {
+        path.name for path in Path("figures").iterdir()
+    }
+
+
 def test_only_solving_needs_oil_and_roughness(asp):
     lines = Path("nu206.toml").read_text("utf-8").splitlines()
     Path("bare.toml").write_text(
@@ -227,7 +235,7 @@ def test_unsolved_contacts_are_reported(asp):
     [
         ("fzg-c", "machine.torqe=3 N m", "machine.torqe is not a known key; did you mean torque?"),
         ("fzg-c", "machine.kind=spur", 'did you mean "spur-gear"?'),
-        ("fzg-c", "machine.kind=", "--set must be KEY=VALUE"),
+        ("fzg-c", "machine.kind=", "--set machine.kind= lacks a value after the equals sign"),
         ("fzg-c", "machine=7", "machine must be a table with the key kind, got 7"),
         ("fzg-c", "machine.speed=50 Hz", "not in r/min or rad/s"),
         ("fzg-c", "machine.speed=50 1/s", "not in r/min or rad/s"),

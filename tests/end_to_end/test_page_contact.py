@@ -108,7 +108,8 @@ TOPS = """() => {
 
 
 def tile(page, name="CLR"):
-    return page.locator("dl div", has_text=name).locator("dd").first
+    """Return a number of the strip."""
+    return page.locator("#headline dl div", has_text=name).locator("dd").first
 
 
 def wait_for_change(page, text, name="CLR"):

@@ -1,6 +1,8 @@
 """The pages of recordings, studies and histories in a browser, and the password of --listen."""
 
 import http.client
+import json
+import os
 import re
 import shutil
 
@@ -114,8 +116,8 @@ def test_a_point_of_a_study_opens_as_an_adjustable_contact(browser, tmp_path):
         page.get_by_role("link", name="Open with its inputs").click()
         page.wait_for_url(re.compile("/contact[?]"))
         page.get_by_text("Solved on 32 × 24 cells").wait_for()
-        expect(page.get_by_role("textbox", name="Composite roughness, Sq")).to_have_value("1.5 um")
-        expect(page.locator("dl div", has_text="CLR").locator("dd").first).to_have_text(
+        expect(page.get_by_role("textbox", name="Composite roughness, Sq")).to_have_value("1.5 µm")
+        expect(page.locator("#headline dl div", has_text="CLR").locator("dd").first).to_have_text(
             clr, use_inner_text=True
         )
         visit.close()
@@ -163,4 +165,40 @@ def test_remote_users_need_the_password(browser, tmp_path):
         page.keyboard.press("Enter")
         page.get_by_role("textbox", name="Load, F").wait_for()
         page.get_by_text("Solved on 80 × 40 cells").wait_for()  # the default case
+        visit.close()
+
+
+def test_the_folder_of_a_rig_gives_the_verdict_of_track(browser, tmp_path, rig, capsys):
+    copied = tmp_path / "rig"
+    shutil.copytree(rig, copied, copy_function=shutil.copy)
+    for path in copied.iterdir():
+        os.utime(path, (1e9, 1e9))
+    files = ["--table", str(copied / "table.csv"), "--case", str(copied / "rig.toml")]
+    with pytest.raises(SystemExit):
+        main(["track", str(copied), *files, "--json", "--quiet"])
+    verdict = json.loads(capsys.readouterr().out)["verdict"]
+    with serving(tmp_path, "rig") as server:
+        visit = Visit(browser, server)
+        page = visit.go("recordings")
+        page.get_by_text("7 recordings read").wait_for()
+        shown = page.locator(".block.verdict p").first.inner_text()
+        assert plain(shown) == plain(verdict)
+        visit.close()
+
+
+def plain(text):
+    """Return prose without differences of print."""
+    return " ".join(text.replace("µm", "um").split())
+
+
+def test_an_empty_page_of_recordings_offers_an_example(browser, tmp_path):
+    with serving(tmp_path) as server:
+        visit = Visit(browser, server)
+        page = visit.go("recordings")
+        page.get_by_text(re.compile("^Drop recordings .* or try an example")).wait_for()
+        assert page.get_by_role("img").count() == 0  # no empty frames
+        page.get_by_role("button", name="Try an example").click()
+        page.get_by_text("12 recordings read").wait_for()
+        page.get_by_text(re.compile("Severe wear from")).wait_for()
+        expect(page.get_by_role("img", name="Contact resonance over the series")).to_be_visible()
         visit.close()

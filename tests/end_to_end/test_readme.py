@@ -1,4 +1,4 @@
-"""README and docs/case-file.md show the actual output: first commands, Python and refusals."""
+"""README, the page on Python and that on the case file show the actual output."""
 
 import io
 import os
@@ -14,6 +14,8 @@ from support.pages import read
 from support.source import ROOT
 
 README = read(ROOT / "README.md")
+PYTHON = read(ROOT / "docs" / "start" / "python.md")
+MAX_WORDS = 700  # of the README, with its code
 # Another processor sums in another order, see test_golden_numbers; only 0 requires every digit.
 TOLERANCE = float(os.environ.get("ASPERITY_GOLDEN_TOLERANCE", "2e-3"))
 NUMBER = re.compile(r"\d+(?:\.\d+)?")
@@ -37,6 +39,10 @@ def last_digit(number: str) -> float:
     return 10.0 ** -len(number.partition(".")[2])
 
 
+def test_the_readme_is_short():
+    assert len(README.text.split()) <= MAX_WORDS
+
+
 def test_the_first_commands_print_the_verdict_shown(asp):
     shutil.copytree(ROOT / "examples", "examples")
     commands, verdict = next(
@@ -54,7 +60,7 @@ def test_the_first_commands_print_the_verdict_shown(asp):
 def test_five_lines_of_python_print_the_verdict_and_draw_the_film(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shutil.copytree(ROOT / "examples", "examples")
-    block, _ = (block for block in README.blocks if block.language == "python")
+    (block,) = (block for block in README.blocks if block.language == "python")
     assert len([line for line in block.text.splitlines() if line]) <= 5
     verdict = next(block.text for block in README.blocks if block.text.startswith("Mixed lubr"))
     printed = io.StringIO()
@@ -65,15 +71,15 @@ def test_five_lines_of_python_print_the_verdict_and_draw_the_film(tmp_path, monk
 
 
 def test_the_python_example_prints_the_output_shown():
-    _, block = (block for block in README.blocks if block.language == "python")
+    _, block = (block for block in PYTHON.blocks if block.language == "python")
     after = next(
         line.text
-        for line in README.prose
+        for line in PYTHON.prose
         if line.number > block.line.number and "This prints" in line.text
     )
     printed = io.StringIO()
     with redirect_stdout(printed):
-        exec(compile(block.text, "README.md", "exec"), {})
+        exec(compile(block.text, "python.md", "exec"), {})
     assert matches(printed.getvalue().strip(), re.search(r"`([^`]+)`", after)[1])
 
 

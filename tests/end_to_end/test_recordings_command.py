@@ -62,6 +62,8 @@ def test_track_names_the_stage_and_raises_the_alarm(asp, rig):
         "t.nc",
         "--out",
         "t.parquet",
+        "--figures",
+        "figures",
         "--json",
     )
     result = json.loads(out)
@@ -85,6 +87,9 @@ def test_track_names_the_stage_and_raises_the_alarm(asp, rig):
         row["x"] for row in result["recordings"]
     )
     assert Path("t.csv").read_text().count("\n") == 25
+    assert {"trend-85mm.pdf", "trend-175mm.pdf", "captions.md"} < {
+        path.name for path in Path("figures").iterdir()
+    }
     page = Path("page.html").read_text("utf-8")
     assert page.index("ALARM") < page.index("Trend and stage") < page.index('id="limits"')
     assert re.findall(r'(?:src|href)="(?!data:|#|https://doi\.org)[^"]*', page) == []

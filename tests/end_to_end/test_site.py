@@ -95,10 +95,11 @@ def test_no_page_loads_anything_from_elsewhere(site):
 
 
 def test_the_gallery_has_scripts_and_notebooks_with_figures(site):
-    scripts = sorted(path.stem for path in ROOT.glob("docs/scripts/*.py"))
+    scripts = sorted(ROOT.glob("docs/scripts/*/*.py"))
     assert len(scripts) >= FEWEST
-    for name in scripts:
-        page = read(site / "gallery" / f"{name}.html")
+    for script in scripts:
+        name = script.stem
+        page = read(site / "gallery" / script.parent.name / f"{name}.html")
         assert any(link.endswith(f"{name}.ipynb") for link in page.links), name
         assert any(re.search(rf"sphx_glr_{name}_\d+", link) for link in page.loaded), name
 
@@ -136,7 +137,7 @@ def test_a_browser_contacts_no_other_host_and_draws_mathematics(site):
         for name in (
             "index",
             "gallery/index",
-            "gallery/01_smooth_line",
+            "gallery/film/01_smooth_line",
             "reference/names/asperity.Grid",
             "search",
         ):

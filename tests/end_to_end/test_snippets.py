@@ -118,7 +118,7 @@ def test_readme_is_run_by_its_own_tests_or_gives_a_reason():
     page = read(ROOT / "README.md")
     marked = [block for block in page.blocks if block.language in RUN and reason(page, block)]
     own = list(snippets(page))
-    assert len(own) == 3, [
+    assert len(own) == 2, [  # the first commands and the example of Python, see test_readme
         block.text for block in own
-    ]  # the first commands and both examples of Python, see test_readme
+    ]
     assert marked

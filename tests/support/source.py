@@ -21,11 +21,11 @@ Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 
 def files() -> Iterator[Path]:
-    """Yield the files of the package."""
+    """Yield the text files of the package."""
     return (
         path
         for path in sorted(PACKAGE.rglob("*"))
-        if path.is_file() and "__pycache__" not in path.parts
+        if path.is_file() and path.suffix != ".npz" and "__pycache__" not in path.parts
     )
 
 

@@ -394,7 +394,7 @@ def test_the_command_runs_a_folder_of_cases(tmp_path, monkeypatch, capsys):
         "48",
         "--out",
         "a.csv",
-        "--figure",
+        "--out",
         "a.png",
     ]
     with pytest.raises(SystemExit) as end:

@@ -261,7 +261,7 @@ def test_the_command_writes_a_case_that_a_study_can_run(
         CAP,
         "--cells",
         "32",
-        "--seeds",
+        "--surfaces",
         "1",
         "--screened",
         "2",

@@ -91,6 +91,15 @@ def test_a_track_without_a_resonance_shows_its_levels(results):
         track.plot("trend")
 
 
+def test_pyplot_shows_a_drawing(results):
+    from matplotlib import pyplot
+
+    axes = results["surface"].plot()
+    assert pyplot.gcf() is axes.figure
+    pyplot.close(axes.figure)
+    assert axes.figure.number not in pyplot.get_fignums()
+
+
 def test_a_drawing_is_chosen_by_name(results):
     assert "Pressure" in results["run"].plot("pressure").get_title("left")
     with pytest.raises(BadInput, match="film, contact, pressure"):

@@ -45,6 +45,8 @@ EXCEPTIONS = {  # valid spans of no known kind
     "acc (m/s²)": "content of a user's file",
     "ring-07.csv.toml": "a user's file",
     "ring-07.toml": "a user's file",
+    "NAME-85mm.pdf": "NAME is that of the picture, see test_report_layout",
+    "NAME-175mm.pdf": "NAME is that of the picture, see test_report_layout",
 }
 JSON_EXCEPTIONS = {  # `--json` keys and values missing from the golden numbers
     "null": "a JSON literal",
@@ -86,9 +88,29 @@ def test_links_resolve(page):
 
 
 @PAGES
+def test_the_text_of_a_link_is_not_a_file_name(page):
+    defects = [f"{location(page, line)}: {text}" for line, text in named_by_file(page)]
+    assert not defects, "\n".join(defects)
+
+
+@PAGES
 def test_blocks_can_be_run(page):
     defects = [f"{location(page, line)}: {defects}" for line, defects in block_problems(page)]
     assert not defects, "\n".join(defects)
+
+
+def named_by_file(page: Page) -> Iterator[tuple[Line, str]]:
+    """Links whose text is the name of a file, which says nothing about its content."""
+    for line in page.prose:
+        yield from (
+            (line, text) for text in re.findall(r"\[(`?[\w/.-]+\.[a-z]{2,4}`?)\]\(", line.text)
+        )
+
+
+def test_a_link_text_that_is_a_file_name_is_detected(tmp_path):
+    path = tmp_path / "page.md"
+    path.write_text("see [theory/wear.md](theory/wear.md) and [wear](theory/wear.md)", "utf-8")
+    assert [text for _, text in named_by_file(read(path))] == ["theory/wear.md"]
 
 
 COMMAND_LINE, STUDY = read(ROOT / "docs" / "command-line.md"), read(ROOT / "docs" / "study.md")

@@ -1,8 +1,10 @@
 """Access, file upload and start-up of the page; widgets escape what they show."""
 
+import asyncio
 import socket
 import subprocess
 import sys
+import threading
 from types import SimpleNamespace
 
 import pytest
@@ -11,7 +13,7 @@ from asperity.core.errors import BadInput, UnreadableFile
 
 pytest.importorskip("panel", reason="the extra page is not installed")
 
-from asperity.app import open_page
+from asperity.app import open_page, server
 from asperity.app.server import PASSWORD, origins, password_for, require_free
 from asperity.app.uploads import FileDrop, safe_name
 from asperity.app.widgets import sentences, tiles
@@ -161,3 +163,21 @@ def test_a_missing_panel_names_the_extra():
     )
     assert done.returncode == 2
     assert done.stderr == "error: the live page needs Panel; pip install 'asperity[page]'\n"
+
+
+def test_results_of_jobs_reach_the_document_in_the_thread_of_the_server(monkeypatch):
+    """One page in some fifty stayed at "Solving ..." when the thread of a job added a callback."""
+    threads = []
+    document = SimpleNamespace(
+        session_context=SimpleNamespace(destroyed=False),
+        add_next_tick_callback=lambda function: (threads.append(threading.get_ident()), function()),
+    )
+    monkeypatch.setattr(server, "_document", lambda: document)
+
+    async def visit():
+        deliver, done = server._deliver(), asyncio.Event()
+        await asyncio.to_thread(deliver, done.set)
+        await asyncio.wait_for(done.wait(), 10.0)
+
+    asyncio.run(visit())
+    assert threads == [threading.get_ident()]

@@ -9,10 +9,10 @@ from asperity.app.contact_jobs import JobFailure, Ticket, run_job
 from asperity.app.contact_result import CAVITATED, TOUCHING
 from asperity.app.folder_jobs import open_history, open_study, solve_row
 from asperity.app.opening import open_page
-from asperity.app.recording_jobs import RecordingInputs, track_files, track_folder
+from asperity.app.recording_jobs import RecordingContext, RecordingInputs, track_files, track_folder
 from asperity.core.signals import Signal
 from asperity.monitoring import TrackSettings, track_recordings
-from asperity.paper import papers_case
+from asperity.paper import RigSettings, papers_case, simulate_rig, write_rig
 from asperity.simulation import run_history, run_wear
 from asperity.study import load_study, plan_study, run_study
 from asperity.vibration import ContactOscillator, acceleration, white_noise
@@ -21,6 +21,7 @@ from support.wearing import FEW, worn_case
 pytestmark = pytest.mark.usefixtures("coarse_search")
 
 NO_SESSION = Ticket(-1, 0)
+CONTEXT = RecordingContext()
 SMALL = {"grid.cells": [32, 24], "surface.correlation_length": "40 um", "vibration": "none"}
 
 
@@ -46,7 +47,7 @@ def recordings(folder):
 
 def test_uploaded_recordings_give_the_same_results_as_track(rig):
     paths = sorted(rig.glob("*.npy"))
-    series = track_files(NO_SESSION, paths, RecordingInputs(rate_hz=2e4, unit="m/s^2"), None)
+    series = track_files(NO_SESSION, paths, RecordingInputs(rate_hz=2e4, unit="m/s^2"), CONTEXT)
     track = track_recordings(paths, TrackSettings(rate_hz=2e4, unit="m/s^2"))
     assert series.verdict == track.verdict()
     assert [row["crf_hz"] for row in series.rows] == [
@@ -62,7 +63,7 @@ def test_uploaded_recordings_give_the_same_results_as_track(rig):
 
 def test_a_recording_without_a_sampling_rate_is_refused_in_the_pages_words(rig):
     failure = run_job(
-        track_files, NO_SESSION, sorted(rig.glob("*.npy"))[:1], RecordingInputs(), None
+        track_files, NO_SESSION, sorted(rig.glob("*.npy"))[:1], RecordingInputs(), CONTEXT
     )
     assert isinstance(failure, JobFailure)
     assert "give the sampling rate" in failure.message
@@ -73,12 +74,12 @@ def test_a_folder_is_read_incrementally(rig, tmp_path):
     folder = tmp_path / "arriving"
     folder.mkdir()
     inputs = RecordingInputs(rate_hz=2e4, unit="m/s^2", band_hz=(2e3, 4e3))
-    assert track_folder(NO_SESSION, folder, tmp_path / "memory", inputs, None) is None
+    assert track_folder(NO_SESSION, folder, tmp_path / "memory", inputs, CONTEXT) is None
     for number, path in enumerate(sorted(rig.glob("*.npy"))[:3], 1):
         new_file = folder / path.name
         new_file.write_bytes(path.read_bytes())
         os.utime(new_file, (1e9 + number, 1e9 + number))
-        series = track_folder(NO_SESSION, folder, tmp_path / "memory", inputs, None)
+        series = track_folder(NO_SESSION, folder, tmp_path / "memory", inputs, CONTEXT)
         assert len(series.rows) == number
     assert series.band_hz == (2e3, 4e3)
 
@@ -145,3 +146,19 @@ def test_a_damaged_folder_is_reported_in_one_sentence(study, tmp_path):
     )
     assert isinstance(run_job(open_study, NO_SESSION, tmp_path), JobFailure)
     assert isinstance(run_job(open_history, NO_SESSION, tmp_path), JobFailure)
+
+
+def test_the_folder_of_a_rig_is_read_with_its_table_and_case(tmp_path):
+    folder = tmp_path / "rig"
+    write_rig(simulate_rig(RigSettings(samples=7, repeats=1, duration_s=2.0)), folder)
+    for path in folder.iterdir():
+        os.utime(path, (1e9, 1e9))
+    opened = open_page(folder)
+    assert (opened.kind, opened.table, opened.stated) == ("recordings", folder / "table.csv", True)
+    context = RecordingContext(opened.case, opened.table)
+    (tmp_path / "memory").mkdir()
+    series = track_folder(NO_SESSION, folder, tmp_path / "memory", RecordingInputs(), context)
+    track = track_recordings([folder], case=opened.case, table=opened.table)
+    assert series.verdict == track.verdict()
+    assert "Severe wear" in series.verdict
+    assert (series.x_name, len(series.rows)) == ("sq_um", 7)

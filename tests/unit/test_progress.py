@@ -45,6 +45,27 @@ def test_progress_is_shown_on_the_terminal_while_output_is_redirected():
     assert "2 read" in output_text
 
 
+def test_lines_of_a_log_report_that_the_work_continues(monkeypatch, capsys):
+    monkeypatch.setattr(output, "FIRST_LINE_S", 0.05)
+    with output.progress("case", "setting up ...", quiet=False) as display:
+        sleep(0.1)
+        display("3 of 9 contacts", 3, 9)
+        sleep(0.6)
+    first, *rest = capsys.readouterr().err.splitlines()
+    assert first == "case: setting up ... (0 s so far)"
+    assert 2 <= len(rest) <= 4  # at 0.15, 0.35 and 0.75 s, delays double
+    assert set(rest) <= {f"case: 3 of 9 contacts ({seconds} s so far)" for seconds in (0, 1)}
+    sleep(0.3)
+    assert capsys.readouterr().err == ""
+
+
+def test_a_watch_prints_no_lines_of_progress(monkeypatch, capsys):
+    monkeypatch.setattr(output, "FIRST_LINE_S", 0.02)
+    with output.progress("recordings", "watching ...", quiet=False, log=False):
+        sleep(0.2)
+    assert capsys.readouterr().err == ""
+
+
 def test_quiet_shows_no_progress(capsys):
     with output.progress("case", quiet=True, compiles=True) as display:
         display("step 1")

@@ -358,15 +358,13 @@ def test_the_command_prints_its_verdict_first_and_draws(tmp_path, monkeypatch, c
         "surface.correlation_length=60 um",
         "--out",
         "kept",
-        "--figure",
-        "effects.pdf",
     ]
     with pytest.raises(SystemExit) as end:
         main(arguments)
     out, err = capsys.readouterr()
     assert (end.value.code or 0, err) == (0, "")
     assert out.splitlines()[0].startswith("Over the ranges")
-    assert Path("effects.pdf").read_bytes().startswith(b"%PDF")
+    assert Path("kept/effects.png").read_bytes().startswith(b"\x89PNG")
     assert (
         Path("kept/effects.csv")
         .read_text("utf-8")
@@ -385,7 +383,6 @@ def test_the_command_prints_its_verdict_first_and_draws(tmp_path, monkeypatch, c
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--figure", "effects.svg"], ".png or .pdf"),
         (["--samples", "64"], "--samples does not apply to --method morris"),
         (["--method", "guess"], "--method must be morris or sobol"),
         (["--sq", "2 N"], "--sq must be a length"),

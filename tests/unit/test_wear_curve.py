@@ -49,23 +49,43 @@ def resonance_columns(law, scatter=2.0, seed=3):
 
 
 def test_means_deviations_and_intervals_follow_students_distribution():
-    curve = synthetic_curve([1.0, 2.0], 3, car=lambda sq, seed: sq + (seed - 1.0))
-    assert curve.mean("car") == pytest.approx([1.0, 2.0])
-    assert curve.std("car") == pytest.approx([1.0, 1.0])
+    curve = synthetic_curve([1.0, 2.0], 3, crf_hz=lambda sq, seed: sq + (seed - 1.0))
+    assert curve.mean("crf_hz") == pytest.approx([1.0, 2.0])
+    assert curve.std("crf_hz") == pytest.approx([1.0, 1.0])
     reach = 2.91998558 / np.sqrt(3.0)  # printed tables: t of 2 degrees of freedom, two-sided 90 %
-    assert curve.interval("car") == pytest.approx(
+    assert curve.interval("crf_hz") == pytest.approx(
         np.array([[1.0 - reach, 1.0 + reach], [2.0 - reach, 2.0 + reach]])
     )
 
 
 def test_interpolation_between_levels_is_linear_with_independent_errors():
-    curve = synthetic_curve([1.0, 2.0], 3, car=lambda sq, seed: sq + (seed - 1.0))
+    curve = synthetic_curve([1.0, 2.0], 3, crf_hz=lambda sq, seed: sq + (seed - 1.0))
     reach = 2.91998558 / np.sqrt(3.0)
-    middle, low, high = curve.interpolate(1.25e-6, "car")
+    middle, low, high = curve.interpolate(1.25e-6, "crf_hz")
     deviation = reach * np.hypot(0.75, 0.25)
     assert (middle, low, high) == pytest.approx((1.25, 1.25 - deviation, 1.25 + deviation))
-    assert curve.interpolate(2e-6, "car") == pytest.approx((2.0, 2.0 - reach, 2.0 + reach))
-    assert np.isnan(curve.interpolate(2.1e-6, "car")).all()
+    assert curve.interpolate(2e-6, "crf_hz") == pytest.approx((2.0, 2.0 - reach, 2.0 + reach))
+    assert np.isnan(curve.interpolate(2.1e-6, "crf_hz")).all()
+
+
+def test_the_interval_of_a_share_lies_within_0_to_1_and_keeps_its_coverage():
+    rng = np.random.default_rng(5)
+    true, studies = 0.09, 60
+    shares = rng.beta(1.0, 1.0 / true - 1.0, (studies, 3))  # mean 0.09, deviation 0.08
+    curve = synthetic_curve(
+        [float(level + 1) for level in range(studies)],
+        3,
+        clr=lambda sq, seed: shares[np.round(sq).astype(int) - 1, np.asarray(seed, int)],
+        crfa=lambda sq, seed: shares[np.round(sq).astype(int) - 1, np.asarray(seed, int)],
+    )
+    clipped, unlimited = curve.interval("clr"), curve.interval("crfa")
+    assert (unlimited[:, 0] < 0.0).mean() > 0.2  # Student's interval alone leaves the range
+    assert clipped.min() >= 0.0
+    assert clipped.max() <= 1.0
+    covered = [(ends[:, 0] <= true) & (true <= ends[:, 1]) for ends in (clipped, unlimited)]
+    assert (covered[0] == covered[1]).all()
+    middle, low, high = curve.interpolate(1.5e-6, "clr")
+    assert 0.0 <= low <= middle <= high <= 1.0
 
 
 def test_failed_cases_and_missing_resonances_are_excluded_from_means():

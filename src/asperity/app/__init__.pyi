@@ -1,3 +1,4 @@
+from .contact_page import ReportTools as ReportTools
 from .contact_result import ContactResult as ContactResult
 from .contact_result import ResonanceSpectrum as ResonanceSpectrum
 from .contact_result import ResultTile as ResultTile

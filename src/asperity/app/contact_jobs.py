@@ -19,18 +19,21 @@ from threadpoolctl import threadpool_limits
 
 from asperity.app.contact_result import ContactResult, coarse_result, result_of_run
 from asperity.app.settings import limit_cells
-from asperity.case import Case
+from asperity.case import Case, MachineCase
 from asperity.contact.grid import Grid
 from asperity.core.errors import AsperityError, BadInput
 from asperity.core.processes import set_up_worker
 from asperity.ehl import ContactSolution, Iteration, solve_contact
 from asperity.paper import papers_case
-from asperity.results import Run, load_run, solve_case
+from asperity.results import FrictionPoint, Run, load_run, solve_case, stribeck_curve
 from asperity.surface import Surface
 
 ReportWriter = Callable[
     [Sequence[Run], Path], Path
 ]  # `asperity.report.write_report`, passed in by the command line
+
+MachineDrawer = Callable[[MachineCase], tuple[str, str, str]]
+"""Draws a machine: data URI, alternative text and caption; passed in by the command line."""
 
 COARSE_CELLS = 64 * 64  # largest number of cells of a coarse solution
 COARSEST_CELLS = 32 * 32  # the same, if that one does not converge within its steps
@@ -50,6 +53,14 @@ class JobFailure(NamedTuple):
     """Outcome of a job that failed, with a message for the user."""
 
     message: str
+
+
+class Drawing(NamedTuple):
+    """Drawing of a machine as data URI, with its alternative text and caption."""
+
+    uri: str
+    alt: str
+    caption: str
 
 
 class Ticket(NamedTuple):
@@ -153,6 +164,13 @@ def solve_fully(ticket: Ticket, case: Case) -> ContactResult:
     return result_of_run(run, time.perf_counter() - start)
 
 
+def solve_at_speed(ticket: Ticket, case: Case, speed: float) -> FrictionPoint:
+    """Solve the contact at another entrainment speed [m/s], as a point of its Stribeck curve."""
+    limit_cells(case.source, case.grid.cells)
+    curve = stribeck_curve(case, speeds=[speed], progress=_progress_hook(ticket, TIME_LIMIT_S))
+    return curve.points[0]
+
+
 def solve_coarsely(ticket: Ticket, case: Case, start: ContactSolution | None) -> CoarseResult:
     """Solve the contact on fewer cells; the result is empty if its own grid is as coarse.
 
@@ -229,6 +247,11 @@ def open_run(path: Path) -> tuple[Case, ContactResult]:
     """Load a stored run; return its case and result."""
     run = load_run(path)
     return run.case, result_of_run(run, run.solution.convergence.seconds)
+
+
+def draw_machine(ticket: Ticket, machine: MachineCase, draw: MachineDrawer) -> Drawing:  # noqa: ARG001
+    """Draw a machine to scale."""
+    return Drawing(*draw(machine))
 
 
 def make_report(ticket: Ticket, case: Case, write: ReportWriter) -> str:

@@ -1,43 +1,70 @@
 """Page of a contact: inputs and results, redrawn whenever the session changes."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 from bokeh.models import Column, UIElement
 
 from asperity.app import export
-from asperity.app.contact_jobs import JobFailure, ReportWriter, make_report, open_surface
+from asperity.app.contact_jobs import (
+    JobFailure,
+    MachineDrawer,
+    ReportWriter,
+    make_report,
+    open_surface,
+)
 from asperity.app.contact_result import ContactResult
+from asperity.app.contact_tools import Sound, link_button, picture_button
 from asperity.app.figures import SPECTRUM_HEIGHT, TRIALS_HEIGHT, SpectrumFigure, TrialFigures
 from asperity.app.jobs import JobQueue, WorkerPool
+from asperity.app.machine_drawing import MachineDrawing
 from asperity.app.map_images import MapImages, placeholder
+from asperity.app.presets import TITLES, preset_case
 from asperity.app.session import ContactSession
-from asperity.app.settings import Settings, surface_key
+from asperity.app.settings import Settings, preset_key, surface_key
+from asperity.app.speed_curve import SpeedCurve
 from asperity.app.surface_store import SurfaceStore
 from asperity.app.uploads import FileDrop
 from asperity.app.widgets import (
+    CHIP,
+    CHOSEN,
     DROP,
+    HEADLINE,
     INHERIT,
     LOOK,
     MAP_KEY,
     TILE_STYLES,
     Download,
+    HeadlineStrip,
     InputWidget,
     Layout,
     PageBlock,
     StaleMark,
     button,
     button_row,
+    headline,
     notes,
     sentences,
     text_block,
     tiles,
 )
-from asperity.case import Case
+from asperity.case import Case, MachineCase
 from asperity.core.quantities import quantity
 
 LINK_NOTE = "The link to this page remains valid while the server runs."
 SURFACE_LIMIT = 300_000_000  # bytes of a measured surface
+
+
+class ReportTools(NamedTuple):
+    """Functions of `asperity.report` that the page calls, passed in by the command line.
+
+    `write_report` writes the report of a run, `draw_machine` draws a machine to scale.
+    """
+
+    write_report: ReportWriter
+    draw_machine: MachineDrawer
 
 
 class ContactView:
@@ -46,11 +73,11 @@ class ContactView:
     Parameters
     ----------
     settings : the opened case
-    workshop : runs the jobs
+    worker_pool : runs the jobs
     deliver : calls a function under the document's lock
     set_address : sets the query of the browser's address
-    write_report : writes the report of a run
-    shelf : stores dropped surfaces
+    tools : report of a run and drawing of a machine
+    surfaces : stores dropped surfaces
     """
 
     def __init__(
@@ -59,34 +86,46 @@ class ContactView:
         worker_pool: WorkerPool,
         deliver: Callable[[Callable[[], None]], None],
         set_address: Callable[[str], None],
-        write_report: ReportWriter,
+        tools: ReportTools,
         surfaces: SurfaceStore,
     ) -> None:
         self._surfaces = surfaces
-        self._set_address, self._write_report = set_address, write_report
+        self._set_address, self._tools = set_address, tools
         self._worker_pool, self._deliver = worker_pool, deliver
-        self.session = ContactSession(
-            settings, JobQueue(worker_pool, deliver), self.draw, JobQueue(worker_pool, deliver)
-        )
+        coarse, full = (JobQueue(worker_pool, deliver, solves=True) for _ in range(2))
+        self.session = ContactSession(settings, coarse, self.draw, full)
         self._side_jobs = JobQueue(worker_pool, deliver)
+        self.drawing = MachineDrawing(worker_pool, deliver, tools.draw_machine)
+        self.sound = Sound()
+        self.speeds = SpeedCurve(
+            JobQueue(worker_pool, deliver, solves=True), lambda: not self.session.pending
+        )
         self.inputs: dict[str, InputWidget] = {}
-        self._built: Case | None = None
+        self._built: Case | MachineCase | None = None
         self._more = False
         self._drawn: tuple[ContactResult, ContactResult | None] | None = None
         self._create_outputs()
         self._create_controls()
         self._build_knobs()
+        worker_pool.when_warm(lambda: deliver(self.draw))
 
     def _create_outputs(self) -> None:
         """Create texts, and placeholders of the figures."""
         self.maps = MapImages()
         self.spectrum = placeholder(SPECTRUM_HEIGHT)
         self.share, self.resonance = placeholder(TRIALS_HEIGHT), placeholder(TRIALS_HEIGHT)
+        self.stribeck = placeholder(TRIALS_HEIGHT)
         self._spectrum: SpectrumFigure | None = None
         self._trials: TrialFigures | None = None
-        self._pending_figures = [*self.maps.steps(), self._make_spectrum, self._make_trials]
+        self._pending_figures = [
+            *self.maps.steps(),
+            self._make_spectrum,
+            self._make_trials,
+            self._make_speeds,
+        ]
         self.status, self.verdict, self.notes, self.message = (text_block() for _ in range(4))
         self.tiles = text_block(TILE_STYLES)
+        self.strip = HeadlineStrip()
         self.stale_mark = StaleMark(self.status)
         self.download = Download()
 
@@ -104,10 +143,18 @@ class ContactView:
             stylesheets=[LOOK, DROP],
         )
         self.more = button("More inputs", self._show_more)
+        self._chips = {
+            key: button(title, partial(self._open_preset, key)) for key, title in TITLES.items()
+        }
+        self.presets = button_row(*self._chips.values())
+        self.presets.styles = {"flex-wrap": "nowrap", "overflow-x": "auto"}
         self.pin = button("Pin to compare", self._pin)
         self.report = button("Report", self._make_report)
         self.buttons = button_row(
+            self.sound.button,
             self.pin,
+            link_button(),
+            picture_button(),
             button("Case file", self._give_case),
             button("Python script", self._give_script),
             self.report,
@@ -118,6 +165,8 @@ class ContactView:
         if result is not None and not query:
             self.session.open(self.session.settings, result)
             return
+        if (preset := preset_key(query)) in TITLES:
+            self.session.settings = Settings(preset_case(preset), preset=preset)
         key = surface_key(query)
         case = self._surfaces.load(key, self.drop.folder) if key else None
         if case is not None:
@@ -138,6 +187,8 @@ class ContactView:
         self._pending_figures.clear()
         self.session.close()
         self._side_jobs.close()
+        self.drawing.close()
+        self.speeds.close()
         self.drop.close()
 
     # Results
@@ -148,35 +199,58 @@ class ContactView:
         session = self.session
         if session.settings.opened is not self._built:
             self._build_knobs()
-        loading = (
-            ""
-            if self._worker_pool.is_warm
-            else "Loading the solver (the first time, it is also compiled). "
-        )
+        loading = self._worker_pool.is_compiling
         kind = (
             "alarm"
             if session.problem or (session.result is not None and not session.result.converged)
             else "soft"
         )
         status = session.status if session.stale or not self._pending_figures else "Drawing ..."
-        for key, widget in self.inputs.items():
-            rejected = session.rejected.get(key)
-            widget.show(
-                rejected.text if rejected else session.settings.text(key),
-                rejected.message if rejected else "",
-            )
+        self._draw_inputs()
         self.stale_mark.show(session.stale)
+        self.drawing.show(session.settings.machine)
+        self._draw_strip(loading=loading)
+        if session.pending:
+            self.speeds.pause()
         if session.result is not None:
             self.tiles.text = tiles(
-                session.result.tiles, session.result, session.pinned, stale=session.pending
+                [tile for tile in session.result.tiles if tile.key not in HEADLINE],
+                session.result,
+                session.pinned,
+                stale=session.stale,
             )
             if (session.result, session.pinned) != self._drawn:
                 self._draw_result(session.result, session.pinned)
                 self._drawn = (session.result, session.pinned)
         self.pin.label = "Unpin" if session.pinned is not None else "Pin to compare"
+        notice = "Loading the solver (the first time, it is also compiled). " if loading else ""
         self.status.text = sentences(
-            [f"{loading}{status}"], kind
+            [f"{notice}{status}"], kind
         )  # last: a screen reader announces it when the page is complete
+
+    def _draw_inputs(self) -> None:
+        """Show values, errors and remarks of the inputs, and the selected preset."""
+        session = self.session
+        for key, widget in self.inputs.items():
+            rejected = session.rejected.get(key)
+            widget.show(
+                rejected.text if rejected else session.settings.text(key),
+                rejected.message if rejected else "",
+                "" if rejected else session.settings.remark(key),
+            )
+        for key, chip in self._chips.items():
+            chosen = key == session.settings.preset
+            chip.stylesheets = [LOOK, CHIP, *([CHOSEN] if chosen else [])]
+
+    def _draw_strip(self, *, loading: bool) -> None:
+        """Draw regime, load share and resonance, which stay visible."""
+        session = self.session
+        html = self.strip.html
+        if session.result is not None:
+            html = headline(
+                session.result, session.pinned, state=session.state, stale=session.stale
+            )
+        self.strip.show(html, busy=loading)
 
     def _draw_result(self, result: ContactResult, pinned: ContactResult | None) -> None:
         self.maps.show(result, pinned)
@@ -186,6 +260,9 @@ class ContactView:
         self.notes.text = notes(result.notes)
         self._draw_spectrum()
         self._draw_trials()
+        self.sound.show(result)
+        if not self.session.pending and result.converged:
+            self.speeds.follow(self.session.settings.case, result)
         self._set_address(self.session.settings.address)
 
     def _make_spectrum(self) -> None:
@@ -197,6 +274,9 @@ class ContactView:
         self._trials = TrialFigures(self._restore)
         self.share.children, self.resonance.children = [self._trials.share], [self._trials.crf]
         self._draw_trials()
+
+    def _make_speeds(self) -> None:
+        self.stribeck.children = [self.speeds.create()]
 
     def _draw_spectrum(self) -> None:
         result = self.session.result
@@ -249,6 +329,11 @@ class ContactView:
         self._build_knobs()
         self.draw()
 
+    def _open_preset(self, name: str) -> None:
+        """Open a preset case."""
+        self._show_message()
+        self.session.open(Settings(preset_case(name), preset=name))
+
     def _restore(self, number: int) -> None:
         """Restore the settings of an earlier result."""
         self._show_message()
@@ -289,7 +374,7 @@ class ContactView:
     def _make_report(self) -> None:
         self.report.disabled, self.report.label = True, "Writing report ..."
         self._side_jobs.submit(
-            (make_report, (self.session.settings.case, self._write_report)), self._report_made
+            (make_report, (self.session.settings.case, self._tools.write_report)), self._report_made
         )
 
     def _report_made(self, result: object) -> None:
@@ -317,6 +402,9 @@ def _spectrum_title(result: ContactResult) -> str:
 def layout(view: ContactView) -> Layout:
     """Return the parts of the page by name, and the sections that contain them."""
     parts = {
+        "presets": view.presets,
+        "drawing": view.drawing.model,
+        "headline": view.strip.model,
         "inputs": view.input_column,
         "more": view.more,
         "drop": view.drop,
@@ -330,13 +418,16 @@ def layout(view: ContactView) -> Layout:
         "change": view.maps.change,
         "cut": Column(view.maps.cut_pressure, view.maps.cut_film, sizing_mode="stretch_width"),
         "spectrum": view.spectrum,
+        "stribeck": view.stribeck,
+        "sound": view.sound.model,
         "share": view.share,
         "resonance": view.resonance,
         "notes": view.notes,
         "download": view.download.model,
     }
-    inputs: list[PageBlock] = [{"names": [name]} for name in ("inputs", "more", "drop")]
+    inputs: list[PageBlock] = [{"names": [name]} for name in ("drawing", "inputs", "more", "drop")]
     results: list[PageBlock] = [
+        {"names": ["presets"], "first": True},
         {"names": ["status"], "live": True, "first": True},
         {"names": ["message"], "live": True, "first": True},
         {"names": ["tiles"], "first": True},
@@ -345,9 +436,10 @@ def layout(view: ContactView) -> Layout:
         {"names": ["film", "pressure"], "key": MAP_KEY, "first": True},
         {"names": ["change"]},
         {"names": ["cut", "spectrum"]},
+        {"names": ["stribeck"]},
         {"names": ["share", "resonance"], "heading": "Earlier results"},
         {"names": ["notes"]},
-        {"names": ["download"]},
+        {"names": ["download", "headline", "sound"]},
     ]
     return parts, [
         {"kind": "inputs", "label": "Inputs", "blocks": inputs},

@@ -3,7 +3,7 @@
 All values come from the run, its quantities or the closed forms of Hertz.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, NamedTuple, TypeAlias
 
@@ -16,7 +16,7 @@ from asperity.contact.hertz import ellipse_pressure
 from asperity.core.arrays import Field, Mask
 from asperity.core.quantities import NO_VALUE, UNKNOWN, Quantity, lines, quantity
 from asperity.ehl import ContactSolution, ContactState, hertz_zone
-from asperity.results import UNCERTAINTY, Run
+from asperity.results import UNCERTAINTY, Run, lubrication
 from asperity.solution import contact_state
 
 TILES = (
@@ -32,6 +32,7 @@ TILES = (
 OPEN, TOUCHING, CAVITATED = 0, 1, 2  # state of a cell
 BY_FORMULA = ("lambda_ratio",)  # tiles that do not depend on a solution
 MAX_POINTS = 500  # of a curve of the spectrum
+SOUND_S = 1.5  # of the acceleration to listen to
 GAP_PERCENTILE = 99.0  # of the Hertz zone, where the colours of a film map end
 
 
@@ -104,19 +105,23 @@ class ContactResult(ContactMaps):
     """A solved contact.
 
     `row` holds numbers by their keys in the catalogue, SI. A `coarse` result, on fewer cells and
-    without error bars, is shown until the full one has arrived.
+    without error bars, is shown until the full one has arrived. `regime` is the lubrication regime,
+    `sound` the first `SOUND_S` of the simulated acceleration [m/s^2]; empty without vibration.
     """
 
     text: str
     coarse: bool
     converged: bool
     determined: bool
+    regime: str
     verdict: str
     explained: str
     notes: tuple[str, ...]
     row: Numbers
     seconds: float
     spectrum: ResonanceSpectrum | None = None
+    sound: Field = field(default_factory=lambda: np.empty(0))
+    sound_rate_hz: float = 0.0
 
     @property
     def tiles(self) -> list[ResultTile]:
@@ -146,7 +151,7 @@ class ContactResult(ContactMaps):
             if bounded is not None:
                 return entry.interval(*bounded)
             _, _, spread = entry.number(value, deviation).partition(" ± ")
-            return f"± {spread.rstrip(')')} {entry.display}".rstrip() if spread else ""
+            return f"± {spread.replace(')', '')} {entry.display}".rstrip() if spread else ""
         return "" if entry.key in BY_FORMULA else UNKNOWN
 
 
@@ -170,10 +175,12 @@ def result_of_run(run: Run, seconds: float) -> ContactResult:
         converged=run.converged,
         explained=run.convergence_text,
         determined=run.determined,
+        regime=run.lubrication,
         verdict=run.verdict(),
         notes=tuple(notes),
         seconds=seconds,
         spectrum=_resonance_spectrum(run),
+        **_sound(run),
     )
 
 
@@ -188,6 +195,7 @@ def coarse_result(solution: ContactSolution, text: str, seconds: float) -> Conta
         converged=solution.convergence.converged,
         explained=solution.convergence.explain(),
         determined=False,
+        regime=lubrication(state.clr, lubricated=solution.lubricant is not None),
         verdict="",
         notes=(),
         seconds=seconds,
@@ -271,6 +279,18 @@ def _resonance_spectrum(run: Run) -> ResonanceSpectrum | None:
         crf_std_hz=resonance.crf_std if found and np.isfinite(resonance.crf_std) else None,
         reason=resonance.reason,
     )
+
+
+def _sound(run: Run) -> Numbers:
+    """Return the beginning of the simulated acceleration in single precision, and its rate."""
+    response = None if run.vibration is None else run.vibration.response
+    if response is None:
+        return {}
+    count = round(SOUND_S * response.rate_hz)
+    return {
+        "sound": response.values[:count].astype(np.float32),
+        "sound_rate_hz": response.rate_hz,
+    }
 
 
 def group_means(values: Field, size: int) -> Field:

@@ -71,7 +71,7 @@ def open_study(ticket: Ticket, folder: Path) -> StudyData:  # noqa: ARG001
         for key, column in outputs.items():
             finite = np.isfinite(column)
             means[axis.key, key] = group_means(
-                axis.values[finite], column[finite], binned=axis.binned
+                key, axis.values[finite], column[finite], binned=axis.binned
             )
     numbers = tuple(int(number) for number in overview.used["number"])
     plan = overview.result.plan

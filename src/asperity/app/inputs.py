@@ -5,6 +5,7 @@ case file and validated by the case, not here.
 """
 
 import math
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields
@@ -12,13 +13,14 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from asperity.case import Case, split_amount
+from asperity.case import Case, MachineCase, split_amount
 from asperity.core.documents import Table
 from asperity.core.errors import BadInput
 from asperity.core.quantities import Quantity, quantity
 from asperity.coupling import CONTACT_PATCHES, DAMPING_LAWS, EXCITATIONS, STIFFNESS_LAWS
 from asperity.lubricant import DENSITY_LAWS, FRICTION_LAWS, RHEOLOGY_LAWS, VISCOSITY_LAWS
 
+MOST_PRESSED = "highest pressure"  # of a machine's contacts, by Hertz
 PER_DECADE = 40  # slider steps per decade
 GRIDS = (64, 96, 128, 192, 256)  # selectable numbers of cells along each axis
 MAX_LENGTH = 200  # characters of a value
@@ -29,7 +31,8 @@ class InputSpec(NamedTuple):
 
     `ends` are minimum, maximum and step of a plain number; the slider of an amount covers
     `decades` up and down from the value of the case. `more` marks inputs that are hidden at first.
-    A choice has a `title` and the table of its `laws`, or `names`.
+    A choice has a `title` and the table of its `laws`, or `names`; an input of a machine has a
+    `title` and a `meaning` in place of a quantity.
     """
 
     quantity: str
@@ -40,12 +43,19 @@ class InputSpec(NamedTuple):
     title: str = ""
     laws: Mapping[str, type] = MappingProxyType({})
     names: tuple[str, ...] = ()
+    meaning: str = ""
 
 
 def _law(title: str, group: str, laws: Mapping[str, type]) -> InputSpec:
     return InputSpec("", group, more=True, title=title, laws=laws)
 
 
+def _machine(title: str, meaning: str, *, decades: float = 1.0, more: bool = False) -> InputSpec:
+    return InputSpec("", MACHINE, decades=decades, more=more, title=title, meaning=meaning)
+
+
+POSITION = "position"  # key of the contact of a machine; no key of a case file
+MACHINE = "Machine"
 MOTION = "Load and motion"
 OIL = "Oil"
 ROUGHNESS = "Roughness"
@@ -70,7 +80,22 @@ _SURFACE: dict[str, InputSpec] = {
     "place": InputSpec("surface_place", ROUGHNESS, (0, 20, 1)),
     "seed": InputSpec("surface_seed", ROUGHNESS, (0, 50, 1)),
 }
+_MACHINES = {
+    "torque": _machine("Torque", "on the pinion"),
+    "radial_load": _machine("Radial load", "on the inner ring, downwards in the drawing"),
+    "axial_load": _machine("Axial load", "on the inner ring"),
+    "load": _machine("Load", "between the discs"),
+    "spring_load": _machine("Spring load", "on the closed follower"),
+    "speed": _machine("Speed", "of the pinion, the inner ring or the cam"),
+    "clearance": _machine("Clearance", "diametral, of the mounted bearing", decades=0.7),
+    "lift": _machine("Lift", "largest displacement of the follower", decades=0.1, more=True),
+    "spring_rate": _machine("Spring rate", "force over lift", more=True),
+    "follower_mass": _machine("Follower mass", "moving with the follower", more=True),
+    "face_width": _machine("Face width", "length of the teeth in contact", decades=0.5, more=True),
+}
 INPUT_SPECS: dict[str, InputSpec] = {
+    POSITION: InputSpec("", MACHINE, title="Contact"),
+    **{f"machine.{key}": spec for key, spec in _MACHINES.items()},
     "model": InputSpec("", MODEL, title="Contact model", names=("mixed", "conserving", "paper")),
     "contact.load": InputSpec("load_n", MOTION),
     "contact.entrainment_speed": InputSpec("entrainment_speed_m_s", MOTION),
@@ -128,12 +153,21 @@ class CaseInput:
         title = INPUT_SPECS[self.key].title or self._quantity.title
         if self.key.startswith("surface.second."):
             return f"Second body: {title[:1].lower()}{title[1:]}"
-        return f"{title[:1].upper()}{title[1:]}"
+        unit = " (°)" if self.key.endswith("_deg") else ""
+        return f"{title[:1].upper()}{title[1:]}{unit}"
+
+    @property
+    def hint(self) -> str:
+        """Text of the tooltip: meaning, range of the slider, and key of the case file."""
+        low, high = (shown(self.value_text(end)) for end in self.positions)
+        meaning = f"{self.meaning[:1].upper()}{self.meaning[1:]}. " if self.meaning else ""
+        return f"{meaning}Slider: {low} to {high}; type any other value. Case file: {self.key}"
 
     @property
     def meaning(self) -> str:
         """Explanation of the quantity."""
-        return "" if self.names else self._quantity.meaning
+        spec = INPUT_SPECS[self.key]
+        return spec.meaning or ("" if self.names else self._quantity.meaning)
 
     @property
     def group(self) -> str:
@@ -229,20 +263,48 @@ class CaseInput:
         return max(first, min(last, round(steps)))
 
 
-def case_inputs(case: Case) -> dict[str, CaseInput]:
+def shown(text: str) -> str:
+    """Return a value as the page shows it: µm for um, ° for deg."""
+    degrees = re.sub(r" deg$", "°", re.sub(r" deg(?=[CF]$)", " °", text))
+    return re.sub(r"\bum\b", "µm", degrees)
+
+
+def written(text: str) -> str:
+    """Return a typed value as a case file writes it: um for µm, deg for °."""
+    degrees = re.sub(r"\s*°\s*(?=C|F|$)", " deg", text)
+    return re.sub(r"[µμ](?=m\b)", "u", degrees)
+
+
+def case_inputs(case: Case | MachineCase) -> dict[str, CaseInput]:
     """Return the inputs of a case by key, in display order."""
     tables = tomllib.loads(case.text)
+    if isinstance(case, MachineCase):
+        tables[POSITION] = MOST_PRESSED
     entries = ((key, _lookup(tables, key)) for key in INPUT_SPECS)
     inputs = [
-        CaseInput(key, value, _names(tables, key))
+        CaseInput(key, value, _contacts(case) if key == POSITION else _names(tables, key))
         for key, value in entries
         if value is not None and _is_single(key, value)
     ]
     return {
         case_input.key: case_input
         for case_input in inputs
-        if not INPUT_SPECS[case_input.key].title or len(case_input.names) > 1
+        if not _is_choice(case_input.key) or len(case_input.names) > 1
     }
+
+
+def _is_choice(key: str) -> bool:
+    """Return True for a choice among laws or names."""
+    spec = INPUT_SPECS[key]
+    return bool(spec.title) and not spec.meaning
+
+
+def _contacts(case: Case | MachineCase) -> tuple[str, ...]:
+    """Return the contacts of a machine that can be selected."""
+    if not isinstance(case, MachineCase):
+        return ()
+    moving = (contact.name for contact in case.contacts if not contact.stands_still)
+    return (MOST_PRESSED, *moving)
 
 
 def _names(tables: Table, key: str) -> tuple[str, ...]:
@@ -262,15 +324,16 @@ def _required_parameters(law: type) -> set[str]:
     }
 
 
-def overrides(case: Case, changes: Mapping[str, str]) -> dict[str, object]:
+def overrides(case: Case | MachineCase, changes: Mapping[str, str]) -> dict[str, object]:
     """Convert changed inputs to overrides of the case.
 
     Pairs are given whole, cells as a list, and laws with their own parameters only.
     """
     tables = tomllib.loads(case.text)
     merged = dict[str, object]()
+    values = {key: text for key, text in changes.items() if key != POSITION}
     for key, text in sorted(
-        changes.items(), key=lambda change: change[0].rpartition(".")[2] != "law"
+        values.items(), key=lambda change: change[0].rpartition(".")[2] != "law"
     ):
         stem, _, suffix = key.rpartition(".")
         if suffix == "law" and text in INPUT_SPECS[key].laws:

@@ -1,16 +1,19 @@
 """Pool of worker processes, and job queues in which the newest job replaces waiting ones."""
 
 import multiprocessing
+import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
+from contextlib import suppress
+from functools import partial
 from logging import getLogger
 
 from asperity.app.contact_jobs import JobFailure, Superseded, Ticket, run_job, set_up, warm_up
 from asperity.core.processes import cores
 
 MAX_WORKERS = 4
-SLOTS = 4096  # largest number of queues, three per session
+SLOTS = 4096  # largest number of queues, six per session
 
 Work = tuple[
     Callable[..., object], tuple[object, ...]
@@ -30,18 +33,57 @@ class WorkerPool:
         self._pool = self._new_pool()
         self.warming: list[Future[float]] = []
         self._running: set[Future[object]] = set()
+        self._lock = threading.Lock()  # of the two lists below
+        self._waiting: list[tuple[Future[object], Callable[..., object], tuple[object, ...]]] = []
+        self._when_warm: list[Callable[[], None]] = []
 
     def _new_pool(self) -> Executor:
         return ProcessPoolExecutor(self.workers, self._context, set_up, (self.newest,))
 
     def warm_up(self) -> None:
-        """Let every worker load and compile the solver."""
-        self.warming = [self._pool.submit(warm_up) for _ in range(self.workers)]
+        """Let one worker load and compile the solver; the others then load what it compiled."""
+        first = self._pool.submit(warm_up)
+        self.warming = [first]
+        first.add_done_callback(self._start_waiting)
+
+    def _start_waiting(self, _first: "Future[float]") -> None:
+        """Start the jobs that waited for the solver, and warm up the other workers."""
+        with self._lock:
+            waiting, self._waiting = self._waiting, []
+            callbacks, self._when_warm = self._when_warm, []
+        for outcome, work, arguments in waiting:
+            self.submit(work, *arguments).add_done_callback(partial(_copy_outcome, outcome))
+        with suppress(BrokenExecutor, RuntimeError):  # the pool is closed
+            self.warming += [self._pool.submit(warm_up) for _ in range(self.workers)]
+        for callback in callbacks:
+            callback()
 
     @property
     def is_warm(self) -> bool:
         """True once a worker has warmed up."""
         return any(future.done() for future in self.warming)
+
+    @property
+    def is_compiling(self) -> bool:
+        """True while the first worker loads and compiles the solver."""
+        return bool(self.warming) and not self.is_warm
+
+    def when_warm(self, callback: Callable[[], None]) -> None:
+        """Call a function once a worker has warmed up; at once without a pending warm-up."""
+        with self._lock:
+            if self.is_compiling:
+                self._when_warm.append(callback)
+                return
+        callback()
+
+    def submit_solve(self, work: Callable[..., object], *arguments: object) -> "Future[object]":
+        """Run a job that needs the solver; it waits until one process has compiled it."""
+        with self._lock:
+            if self.is_compiling:
+                outcome: Future[object] = Future()
+                self._waiting.append((outcome, work, arguments))
+                return outcome
+        return self.submit(work, *arguments)
 
     def submit(self, work: Callable[..., object], *arguments: object) -> "Future[object]":
         """Run a job in a worker; its errors are returned as `JobFailure`."""
@@ -56,8 +98,8 @@ class WorkerPool:
 
     @property
     def has_room(self) -> bool:
-        """True if a worker is idle."""
-        return len(self._running) < self.workers
+        """True if a worker is idle, or will be once the solver is compiled."""
+        return len(self._running) + len(self._waiting) < self.workers
 
     def acquire_slot(self) -> int:
         """Reserve a slot; -1 if none is free, whose jobs cannot be superseded."""
@@ -73,7 +115,18 @@ class WorkerPool:
         """Supersede all jobs and stop the workers."""
         for slot in range(SLOTS):
             self.newest[slot] = -1
+        with self._lock:
+            self._waiting.clear()
         self._pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _copy_outcome(outcome: "Future[object]", done: "Future[object]") -> None:
+    """Give a waiting job the outcome of its run."""
+    error = done.exception()
+    if error is None:
+        outcome.set_result(done.result())
+    else:
+        outcome.set_exception(error)
 
 
 class JobQueue:
@@ -83,12 +136,18 @@ class JobQueue:
     ----------
     workshop : runs the jobs
     deliver : calls a function under the document's lock
+    solves : its jobs need the solver and wait until that is compiled
     """
 
     def __init__(
-        self, worker_pool: WorkerPool, deliver: Callable[[Callable[[], None]], None]
+        self,
+        worker_pool: WorkerPool,
+        deliver: Callable[[Callable[[], None]], None],
+        *,
+        solves: bool = False,
     ) -> None:
         self._worker_pool, self._deliver = worker_pool, deliver
+        self._submit = worker_pool.submit_solve if solves else worker_pool.submit
         self._slot = worker_pool.acquire_slot()
         self._number = worker_pool.newest[self._slot] if self._slot >= 0 else 0
         self._running = False
@@ -116,6 +175,13 @@ class JobQueue:
         if not self._running:
             self._next()
 
+    def cancel(self) -> None:
+        """Cancel the running and the waiting job."""
+        self._number += 1
+        if self._slot >= 0:
+            self._worker_pool.newest[self._slot] = self._number
+        self._waiting = None
+
     def close(self) -> None:
         """Cancel all jobs and release the slot."""
         self.closed, self._waiting = True, None
@@ -128,7 +194,7 @@ class JobQueue:
         (function, arguments), on_result = self._waiting
         self._waiting, self._running = None, True
         number = self._number
-        future = self._worker_pool.submit(function, Ticket(self._slot, number), *arguments)
+        future = self._submit(function, Ticket(self._slot, number), *arguments)
         future.add_done_callback(
             lambda done: self._deliver(lambda: self._finish(done, number, on_result))
         )

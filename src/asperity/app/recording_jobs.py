@@ -9,7 +9,7 @@ import numpy as np
 
 from asperity.app.contact_jobs import Ticket
 from asperity.app.contact_result import group_means
-from asperity.case import Case
+from asperity.case import Case, MachineCase, load_case
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
 from asperity.monitoring import (
@@ -20,15 +20,28 @@ from asperity.monitoring import (
     track_recordings,
     watch_folder,
 )
+from asperity.paper import RigSettings, simulate_rig, write_rig
 
 MAX_LINES = 600  # of a spectrum
 MAX_ROWS = 400  # recordings of a waterfall
 SETTLE_S = 2.0  # time for which a file must not have changed
+EXAMPLE_SAMPLES, EXAMPLE_S = 12, 4.0  # recordings of the example, and their duration
 FIELDS = {  # of the page, by arguments as messages of the library name them
     "`rate_hz`": "the sampling rate",
     "`case` or `band_hz`": "the band",
     "`scale`": "the scale",
 }
+
+
+class RecordingContext(NamedTuple):
+    """Contact and table of a series.
+
+    `case` gives the search band and the load share of a CRF, `table` the places of the recordings;
+    None: the contact of the paper, and the order of the recordings.
+    """
+
+    case: Case | MachineCase | None = None
+    table: Path | None = None
 
 
 class RecordingInputs(NamedTuple):
@@ -77,18 +90,26 @@ def track_files(
     ticket: Ticket,  # noqa: ARG001
     paths: Sequence[Path],
     inputs: RecordingInputs,
-    case: Case | None,
+    context: RecordingContext,
 ) -> RecordingSeries:
     """Track dropped recordings as one series."""
     try:
         track = track_recordings(
             paths,
             TrackSettings(**inputs._asdict()),
-            case=case,
+            case=context.case,
+            table=context.table,
         )
     except BadInput as error:
         raise BadInput(_name_page_fields(str(error))) from None
     return series_of_track(track)
+
+
+def simulate_example(ticket: Ticket, folder: Path) -> RecordingContext:  # noqa: ARG001
+    """Simulate the paper's wear test into a folder: recordings, table and case."""
+    rig = simulate_rig(RigSettings(samples=EXAMPLE_SAMPLES, repeats=1, duration_s=EXAMPLE_S))
+    write_rig(rig, folder)
+    return RecordingContext(load_case(folder / "rig.toml"), folder / "table.csv")
 
 
 def track_folder(
@@ -96,7 +117,7 @@ def track_folder(
     folder: Path,
     memory: Path,
     inputs: RecordingInputs,
-    case: Case | None,
+    context: RecordingContext,
 ) -> RecordingSeries | None:
     """Track a folder in its current state; None without readable recordings.
 
@@ -107,7 +128,8 @@ def track_folder(
         memory,
         TrackSettings(**inputs._asdict()),
         WatchSettings(once=True, settle_time_s=SETTLE_S),
-        case=case,
+        case=context.case,
+        table=context.table,
     )
     try:
         update = next(updates)

@@ -12,7 +12,14 @@ from markupsafe import Markup
 from asperity.app.contact_jobs import JobFailure
 from asperity.app.figures import BLUE, GREY, VERMILION, plain_figure
 from asperity.app.jobs import JobQueue, WorkerPool
-from asperity.app.recording_jobs import RecordingInputs, RecordingSeries, track_files, track_folder
+from asperity.app.recording_jobs import (
+    RecordingContext,
+    RecordingInputs,
+    RecordingSeries,
+    simulate_example,
+    track_files,
+    track_folder,
+)
 from asperity.app.uploads import FileDrop
 from asperity.app.widgets import (
     DROP,
@@ -26,7 +33,7 @@ from asperity.app.widgets import (
     sentences,
     text_block,
 )
-from asperity.case import Case, read_amount
+from asperity.case import read_amount
 from asperity.core.arrays import Field
 from asperity.core.coverage import NORMAL_FACTOR
 from asperity.core.errors import BadInput
@@ -44,24 +51,37 @@ class RecordingsView:
     Parameters
     ----------
     folder : watched folder; None for dropped files
-    case : contact that defines the search band; None: contact of the paper, as stated in the notes
+    context : contact and table of the series
     """
 
     def __init__(
         self,
         folder: Path | None,
-        case: Case | None,
+        context: RecordingContext,
         worker_pool: WorkerPool,
         deliver: Callable[[Callable[[], None]], None],
     ) -> None:
-        self._folder, self._case = folder, case
+        self._folder, self._context = folder, context
         self._queue = JobQueue(worker_pool, deliver)
         self._dropped: list[Path] = []
         self._submitted = 0
         self._memory: TemporaryDirectory[str] | None = None
+        self._example: TemporaryDirectory[str] | None = None
         self.series: RecordingSeries | None = None
         self.status, self.verdict, self.notes = (text_block() for _ in range(3))
         self.table = text_block(TABLE)
+        self._create_inputs()
+        self._build_figures()
+        for part in (self.waterfall, self.track, self.one, self.choice):
+            part.visible = False  # until there are recordings
+        if folder is None:
+            self._tell(
+                "Drop recordings (CSV, WAV, HDF5, TDMS, UFF ...) to see the contact resonance and "
+                "its trend, or try an example: the paper's wear test, simulated."
+            )
+
+    def _create_inputs(self) -> None:
+        """Create the file drop, the typed properties and the buttons."""
         self.drop = FileDrop(
             limit=RECORDING_LIMIT,
             on_file=self._file_dropped,
@@ -88,9 +108,10 @@ class RecordingsView:
             title="Search band (default: from the case)", placeholder="2 kHz to 5 kHz", **style
         )
         self.reread = button("Read again", self.read)
+        self.example = button("Try an example", self._open_example)
+        self.example.visible = self._folder is None
         self.choice = Select(title="Recording", options=[], **style)
         self.choice.on_change("value", lambda _name, _old, new: self._show_one(new))
-        self._build_figures()
 
     def _build_figures(self) -> None:
         self._build_waterfall()
@@ -189,14 +210,15 @@ class RecordingsView:
             self._submitted = len(self._dropped)
             self._tell(f"Reading {self._submitted} recordings ...")
             self._queue.submit(
-                (track_files, (tuple(self._dropped), inputs, self._case)), self._read
+                (track_files, (tuple(self._dropped), inputs, self._context)), self._read
             )
             return
         if self._memory is None:
             self._memory = TemporaryDirectory(prefix="asperity-page-")
             self._tell("Reading the folder ...")
         self._queue.submit(
-            (track_folder, (self._folder, Path(self._memory.name), inputs, self._case)), self._read
+            (track_folder, (self._folder, Path(self._memory.name), inputs, self._context)),
+            self._read,
         )
 
     @property
@@ -209,12 +231,36 @@ class RecordingsView:
         self._queue.close()
         self.drop.close()
         self._discard_memory()
+        if self._example is not None:
+            self._example.cleanup()
         self.series = None
 
     def _discard_memory(self) -> None:
         if self._memory is not None:
             self._memory.cleanup()
             self._memory = None
+
+    def _open_example(self) -> None:
+        """Simulate the paper's wear test and open its recordings."""
+        if self._queue.busy:
+            return
+        if self._example is None:
+            self._example = TemporaryDirectory(prefix="asperity-page-")
+        folder = Path(self._example.name) / "rig"
+        self._tell("Simulating the recordings of the paper's wear test ...")
+        self.example.disabled = True
+        self._queue.submit((simulate_example, (folder,)), self._example_made)
+
+    def _example_made(self, result: object) -> None:
+        self.example.disabled = False
+        if isinstance(result, JobFailure):
+            self._show_message(result.message)
+            return
+        assert isinstance(result, RecordingContext)
+        assert result.table is not None
+        self._context = result
+        self._dropped = sorted(result.table.parent.glob("*.h5"))
+        self.refresh()
 
     def _file_dropped(self, path: Path) -> None:
         self._dropped.append(path)
@@ -243,6 +289,8 @@ class RecordingsView:
     def show(self, series: RecordingSeries) -> None:
         """Draw a series."""
         self.series = series
+        for part in (self.waterfall, self.track, self.one, self.choice):
+            part.visible = True
         self.verdict.text = sentences([series.verdict], "alarm" if series.alarm == "alarm" else "")
         self.notes.text = notes(series.notes)
         self.table.text = _table(series)
@@ -330,7 +378,7 @@ def _table(series: RecordingSeries) -> Markup:
         rows.append(Markup("<tr><th>{}</th>{}<td>{}</td></tr>").format(row["file"], cells, remark))
     body = Markup("").join(rows)
     return Markup(
-        "<table><thead><tr><th>recording</th>{}<th></th></tr></thead><tbody>{}</tbody></table>"
+        "<h2>Recordings</h2><table><thead><tr><th>recording</th>{}<th></th></tr></thead><tbody>{}</tbody></table>"
     ).format(head, body)
 
 
@@ -338,6 +386,7 @@ def layout(view: RecordingsView) -> Layout:
     """Return the parts of the page by name, and the sections that contain them."""
     parts = {
         "drop": view.drop,
+        "example": view.example,
         "rate": view.rate,
         "unit": view.unit,
         "channel": view.channel,
@@ -352,7 +401,7 @@ def layout(view: RecordingsView) -> Layout:
         "table": view.table,
         "notes": view.notes,
     }
-    names = ("drop", "rate", "unit", "channel", "band", "again")
+    names = ("drop", "example", "rate", "unit", "channel", "band", "again")
     inputs: list[PageBlock] = [{"names": [name]} for name in names]
     results: list[PageBlock] = [
         {"names": ["status"], "live": True, "first": True},
@@ -360,7 +409,7 @@ def layout(view: RecordingsView) -> Layout:
         {"names": ["waterfall", "track"], "first": True},
         {"names": ["choice"]},
         {"names": ["one"]},
-        {"names": ["table"], "heading": "Recordings"},
+        {"names": ["table"]},
         {"names": ["notes"]},
     ]
     return parts, [

@@ -6,6 +6,7 @@ import os
 import secrets
 import socket
 from collections.abc import Callable
+from functools import partial
 from importlib.metadata import version
 from importlib.resources import files
 from typing import Any
@@ -13,7 +14,7 @@ from urllib.parse import urlencode
 
 import panel
 from bokeh.models import UIElement
-from tornado.ioloop import PeriodicCallback
+from tornado.ioloop import IOLoop, PeriodicCallback
 from tornado.iostream import StreamClosedError
 from tornado.web import RedirectHandler
 from tornado.websocket import WebSocketClosedError
@@ -22,13 +23,14 @@ from asperity.app import contact_page as contact
 from asperity.app import history_page as history
 from asperity.app import recordings_page as recordings
 from asperity.app import study_page as study
-from asperity.app.contact_jobs import ReportWriter
 from asperity.app.jobs import WorkerPool
 from asperity.app.opening import OpenedPage
+from asperity.app.recording_jobs import RecordingContext
 from asperity.app.session_cleanup import CLEANUP_MS, SessionSweeper, freeze_objects
 from asperity.app.settings import Settings
 from asperity.app.surface_store import SurfaceStore
 from asperity.app.widgets import PageBlock, PageSection
+from asperity.case import Case
 from asperity.core.errors import BadInput
 
 LOCALHOST = "127.0.0.1"
@@ -101,9 +103,9 @@ class PageSite:
     """All pages of one server, and their worker processes."""
 
     def __init__(
-        self, opened: OpenedPage, worker_pool: WorkerPool, write_report: ReportWriter
+        self, opened: OpenedPage, worker_pool: WorkerPool, tools: contact.ReportTools
     ) -> None:
-        self.opened, self.worker_pool, self.write_report = opened, worker_pool, write_report
+        self.opened, self.worker_pool, self.tools = opened, worker_pool, tools
         self.surfaces = SurfaceStore()
         panel.extension("filedropper", notifications=False)
         self.template = files("asperity.app").joinpath("page.html.j2").read_text("utf-8")
@@ -119,11 +121,11 @@ class PageSite:
     def contact(self) -> Any:
         """Create the page of a contact for one visit."""
         view = contact.ContactView(
-            Settings(self.opened.case),
+            Settings(self.opened.case, preset=self.opened.preset),
             self.worker_pool,
             _deliver(),
             _address(),
-            self.write_report,
+            self.tools,
             self.surfaces,
         )
         parts, sections = contact.layout(view)
@@ -134,13 +136,15 @@ class PageSite:
         )  # in case the event never arrives
         _document().js_on_event("document_ready", view.stale_mark.update_page)
         panel.state.on_session_destroyed(lambda _context: view.close())
-        return self._page("contact", "Contact", parts, sections)
+        return self._page("contact", "Contact", parts, sections, headline=view.strip.html)
 
     def recordings(self) -> Any:
         """Create the page of recordings for one visit."""
         folder = self.opened.path if self.opened.kind == "recordings" else None
-        case = self.opened.case if self.opened.stated else None
-        view = recordings.RecordingsView(folder, case, self.worker_pool, _deliver())
+        context = RecordingContext(
+            self.opened.case if self.opened.stated else None, self.opened.table
+        )
+        view = recordings.RecordingsView(folder, context, self.worker_pool, _deliver())
         panel.state.on_session_destroyed(lambda _context: view.close())
         if folder is not None:
             _document().add_periodic_callback(view.refresh, FOLDER_CHECK_MS)
@@ -150,6 +154,7 @@ class PageSite:
     def study(self) -> Any:
         """Create the page of a study for one visit."""
         assert self.opened.path is not None
+        assert isinstance(self.opened.case, Case)
         view = study.StudyView(self.opened.path, self.opened.case, self.worker_pool, _deliver())
         panel.state.on_session_destroyed(lambda _context: view.close())
         view.begin()
@@ -175,7 +180,13 @@ class PageSite:
         return {name: creators[name] for name, _ in self.links}
 
     def _page(
-        self, kind: str, heading: str, parts: dict[str, object], sections: list[PageSection]
+        self,
+        kind: str,
+        heading: str,
+        parts: dict[str, object],
+        sections: list[PageSection],
+        *,
+        headline: str = "",
     ) -> Any:
         page = panel.Template(self.template, location=True)
         document = _document()
@@ -195,6 +206,8 @@ class PageSite:
             "sections": sections,
             "style": self.style,
             "kind": kind,
+            "headline": headline,
+            "compiling": self.worker_pool.is_compiling,
             "foot": f"asperity {version('asperity')}, {self.opened.name}",
         }
         for name, value in variables.items():
@@ -220,14 +233,18 @@ def _limit_logging() -> None:
 
 
 def _deliver() -> Callable[[Callable[[], None]], None]:
-    """Return a function that runs others under the lock of the current document, thread-safe."""
-    document = _document()
+    """Return a function that runs others under the lock of the current document, thread-safe.
 
-    def deliver(function: Callable[[], None]) -> None:
+    A callback that another thread adds to a document is lost while Bokeh holds its events back,
+    so that only the server's own thread adds them.
+    """
+    document, loop = _document(), IOLoop.current()
+
+    def add(function: Callable[[], None]) -> None:
         if document.session_context is not None and not document.session_context.destroyed:
             document.add_next_tick_callback(function)
 
-    return deliver
+    return partial(loop.add_callback, add)
 
 
 def _document() -> Any:
@@ -262,7 +279,7 @@ def serve_page(
     port: int = PORT,
     listen: str = LOCALHOST,
     ready: Callable[[str], None],
-    write_report: ReportWriter,
+    tools: contact.ReportTools,
 ) -> None:
     """Serve the pages until interrupted.
 
@@ -272,7 +289,7 @@ def serve_page(
     port : 0 for a free one
     listen : address to listen on; remote access needs a password in `ASPERITY_PAGE_PASSWORD`
     ready : called with the address of the page when it is available
-    write_report : writes the report of a run, `asperity.report.write_report`
+    tools : `write_report` and `machine_drawing` of `asperity.report`
 
     Raises
     ------
@@ -283,7 +300,7 @@ def serve_page(
     password = password_for(listen)
     port = require_free(listen, port)
     worker_pool = WorkerPool()
-    site = PageSite(opened, worker_pool, write_report)
+    site = PageSite(opened, worker_pool, tools)
     try:
         worker_pool.warm_up()
         login: dict[str, Any] = {}

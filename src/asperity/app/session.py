@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from asperity.app.contact_jobs import CoarseResult, JobFailure, solve_coarsely, solve_fully
 from asperity.app.contact_result import ContactResult
 from asperity.app.jobs import JobQueue
+from asperity.app.presets import stored_result
 from asperity.app.settings import RejectedValue, Settings
 from asperity.ehl import ContactSolution
 
@@ -52,6 +53,7 @@ class ContactSession:
         self.pinned: ContactResult | None = None
         self.trials: list[Trial] = []
         self._queue, self._changed, self._full_queue = queue, changed, full_queue
+        self.stored = ""  # version that computed the stored result on display
         self.pending = False  # the full result of the current settings is not available yet
         self._full_submitted = False
         self._start: ContactSolution | None = None
@@ -59,6 +61,10 @@ class ContactSession:
     @property
     def status(self) -> str:
         """State of the solution as a sentence."""
+        if self.rejected:
+            return f"Not solved: {self._invalid} The numbers are those of the last valid values."
+        if self.stored and self.pending:
+            return f"Stored solution of asperity {self.stored}, being solved again ..."
         if self.pending and self.result is None:
             return "Solving the first contact ..."
         if self.pending:
@@ -77,17 +83,35 @@ class ContactSession:
         return f"Solved on {nx} × {ny} cells in {self.result.seconds:.2f} s"
 
     @property
+    def state(self) -> str:
+        """State of the solution in a word or two."""
+        if self.rejected or self.problem:
+            return "outdated: input not solved"
+        if self.pending:
+            return "stored" if self.stored else "solving ..."
+        return "solved" if self.result is not None and self.result.converged else "not converged"
+
+    @property
+    def _invalid(self) -> str:
+        titles = [self.settings.inputs[key].title for key in self.rejected]
+        return f"invalid value of {', '.join(titles)}."
+
+    @property
     def _is_current(self) -> bool:
         return self.result is not None and self.result.text == self.settings.case.text
 
     @property
     def stale(self) -> bool:
-        """True if the figures do not show the current settings."""
-        return self.pending or bool(self.problem) or bool(self.rejected)
+        """True if the figures do not show the current settings in full."""
+        waiting = self.pending and not self.stored
+        return waiting or bool(self.problem) or bool(self.rejected)
 
     def solve(self) -> None:
-        """Solve the contact with the current settings."""
-        self.problem = ""
+        """Solve the contact with the current settings, showing its stored result meanwhile."""
+        self.problem, self.stored = "", ""
+        known = stored_result(self.settings.case)
+        if known is not None:
+            self.result, self.stored = known
         self.pending, self._full_submitted = True, False
         self._queue.submit(
             (solve_coarsely, (self.settings.case, self._start)),
@@ -142,7 +166,7 @@ class ContactSession:
 
     def open(self, settings: Settings, result: ContactResult | None = None) -> None:
         """Start with another case, such as one with a dropped surface, and its result if known."""
-        self.settings, self._start = settings, None
+        self.settings, self._start, self.stored = settings, None, ""
         self.rejected.clear()
         if result is None:
             self.solve()
@@ -177,7 +201,8 @@ class ContactSession:
             self._start = outcome.solution
         if not self.pending:
             return  # the full result arrived first
-        self.result = outcome.result or self.result
+        if not self.stored:
+            self.result = outcome.result or self.result
         if not self._full_submitted:
             self._solve_fully(self._full_queue or self._queue)
         self._changed()
@@ -187,7 +212,7 @@ class ContactSession:
             self._fail(result)
             return
         assert isinstance(result, ContactResult)
-        self.result, self.pending = result, False
+        self.result, self.pending, self.stored = result, False, ""
         if result.converged:
             row = result.row
             trial = Trial(
@@ -198,5 +223,5 @@ class ContactSession:
         self._changed()
 
     def _fail(self, failure: JobFailure) -> None:
-        self.problem, self.pending = failure.message, False
+        self.problem, self.pending, self.stored = failure.message, False, ""
         self._changed()

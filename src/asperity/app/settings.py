@@ -11,14 +11,23 @@ from hashlib import sha256
 from typing import NamedTuple
 from urllib.parse import parse_qsl, urlencode
 
-from asperity.app.inputs import MAX_LENGTH, CaseInput, case_inputs, overrides
-from asperity.case import Case
+from asperity.app.inputs import (
+    MAX_LENGTH,
+    MOST_PRESSED,
+    POSITION,
+    CaseInput,
+    case_inputs,
+    overrides,
+    written,
+)
+from asperity.case import Case, MachineCase, read_length
 from asperity.core.errors import BadInput
 
 MAX_CELLS = 512 * 512  # larger grids need the command line
 MAX_PAIRS = 100  # in an address
-# keys of an address: the case, and name and key of a dropped surface
-CASE, DROPPED, HELD = "case", "dropped", "held"
+# keys of an address: the case, a preset, and name and key of a dropped surface
+CASE, PRESET, DROPPED, HELD = "case", "preset", "dropped", "held"
+MAX_STEEPNESS = 0.1  # Sq over correlation length: a gradient of 0.2, where slopes are still small
 
 
 class RejectedValue(NamedTuple):
@@ -42,21 +51,35 @@ def limit_cells(source: str, cells: tuple[int, int]) -> None:
 class Settings:
     """A case and the changes of its inputs.
 
-    `opened` is the case as opened; `changes` are texts by the keys of inputs; `dropped` is the name
-    of a dropped surface, `held` its key in the surface store.
+    `opened` is the case or machine as opened; `changes` are texts by the keys of inputs; `dropped`
+    is the name of a dropped surface, `held` its key in the surface store; `preset` is the key of a
+    preset.
     """
 
-    opened: Case
+    opened: Case | MachineCase
     changes: Mapping[str, str] = field(default_factory=dict)
     dropped: str = ""
     held: str = ""
+    preset: str = ""
+
+    @cached_property
+    def machine(self) -> MachineCase | None:
+        """Machine with the changes; None for a single contact."""
+        if not isinstance(self.opened, MachineCase):
+            return None
+        changed = overrides(self.opened, self.changes)
+        return self.opened.with_written(changed) if changed else self.opened
 
     @cached_property
     def case(self) -> Case:
-        """Case with the changes; raises BadInput for invalid ones."""
-        if not self.changes:
+        """Case of the contact with the changes; raises BadInput for invalid ones."""
+        if isinstance(self.opened, MachineCase):
+            assert self.machine is not None
+            case = contact_of(self.machine, self.changes.get(POSITION, MOST_PRESSED))
+        elif not self.changes:
             return self.opened
-        case = self.opened.with_written(overrides(self.opened, self.changes))
+        else:
+            case = self.opened.with_written(overrides(self.opened, self.changes))
         if case.contents.grid.cells != "auto":  # choosing cells may read a file: left to a worker
             limit_cells(case.source, case.contents.grid.cells)
         return case
@@ -72,7 +95,7 @@ class Settings:
 
     def with_value(self, key: str, text: str) -> "Settings | RejectedValue":
         """Return settings with a typed value of an input, or its rejection."""
-        text = text.strip()
+        text = written(text.strip())
         if len(text) > MAX_LENGTH:
             return RejectedValue(
                 key,
@@ -89,6 +112,21 @@ class Settings:
             return RejectedValue(key, text, str(error))
         return settings
 
+    def remark(self, key: str) -> str:
+        """Return a remark on a valid but doubtful value of an input; empty without one."""
+        stem, _, name = key.rpartition(".")
+        lengths = [f"{stem}.correlation_length.{axis}" for axis in (0, 1)]
+        if name != "sq" or not set(lengths) <= set(self.inputs):
+            return ""
+        sq, *pair = (read_length(part, self.text(part)) for part in (key, *lengths))
+        ratio = sq / min(pair)
+        if ratio <= MAX_STEEPNESS:
+            return ""
+        return (
+            f"Sq is {ratio:.2g} times the correlation length: the model assumes gentle slopes, Sq "
+            f"of at most {MAX_STEEPNESS:g} times. Decrease Sq or increase the correlation length."
+        )
+
     @property
     def fingerprint(self) -> str:
         """Hash that identifies the opened case in an address."""
@@ -98,11 +136,10 @@ class Settings:
     def address(self) -> str:
         """Query that restores these settings, without question mark; empty without changes."""
         dropped = {DROPPED: self.dropped, HELD: self.held} if self.dropped else {}
-        return (
-            urlencode({CASE: self.fingerprint, **dropped, **self.changes})
-            if self.changes or dropped
-            else ""
-        )
+        preset = {PRESET: self.preset} if self.preset else {}
+        if not self.changes and not dropped:
+            return urlencode(preset)
+        return urlencode({CASE: self.fingerprint, **preset, **dropped, **self.changes})
 
     def from_address(self, query: str) -> "tuple[Settings, list[str]]":
         """Return the settings of an address, and a note for each part that was ignored."""
@@ -116,7 +153,7 @@ class Settings:
                 "drop it again."
             )
         for key, text in pairs:
-            if key in (CASE, DROPPED, HELD):
+            if key in (CASE, PRESET, DROPPED, HELD):
                 if key == CASE and text != self.fingerprint and not surface:
                     notes.append(
                         "The link was made with another case; its changes are applied here."
@@ -130,6 +167,29 @@ class Settings:
             else:
                 notes.append(f"The link has an invalid value, ignored: {changed.message}.")
         return settings, notes
+
+
+def contact_of(machine: MachineCase, name: str) -> Case:
+    """Return the case of a machine's contact by its name; BadInput for one without load."""
+    moving = [contact for contact in machine.contacts if not contact.stands_still]
+    if not machine.complete:
+        raise BadInput(f"{machine.source}: add [lubricant] and [surface] to solve its contacts")
+    if not moving:
+        raise BadInput(f"{machine.source}: no contact carries load and moves")
+    if name == MOST_PRESSED:
+        pressures = [contact.conditions(machine.pair).hertz.p_max for contact in moving]
+        return machine.case(moving[pressures.index(max(pressures))])
+    for contact in moving:
+        if contact.name == name:
+            return machine.case(contact)
+    raise BadInput(
+        f"{machine.source}: {_printable(name)} carries no load now; select another contact"
+    )
+
+
+def preset_key(query: str) -> str:
+    """Return the key of a preset in an address; empty if absent."""
+    return dict(parse_qsl(query.lstrip("?")[:20_000])).get(PRESET, "")
 
 
 def surface_key(query: str) -> str:

@@ -14,14 +14,16 @@ from bokeh.models import (
     Select,
     Slider,
     TextInput,
+    Tooltip,
     UIElement,
 )
 from markupsafe import Markup
 
 from asperity.app.contact_result import ContactResult, ResultTile, difference
-from asperity.app.inputs import CaseInput
-from asperity.core.quantities import in_print
+from asperity.app.inputs import CaseInput, shown, written
+from asperity.core.quantities import in_print, quantity
 
+HEADLINE = ("clr", "crf_hz")  # numbers of the strip, beside the regime
 Look: TypeAlias = dict[str, Any]  # properties of a widget
 
 
@@ -76,6 +78,12 @@ DROP = """
 .filepond--panel-root { background: var(--wash); border: 1px dashed var(--soft); }
 .filepond--drop-label, .filepond--drop-label label { color: var(--ink); font-size: .88rem; }
 """
+DRAWING = """
+img { display: block; width: 100%; height: auto; background: #fff; border-radius: 4px; }
+p { margin: 4px 0 0; font-size: .8rem; color: var(--soft); }
+"""
+CHIP = ".bk-btn { border-radius: 99px; padding: 3px 12px; white-space: nowrap; font-size: .9rem; }"
+CHOSEN = ".bk-btn { border-color: var(--accent); box-shadow: inset 0 0 0 1px var(--accent); }"
 WRONG = ".bk-input { border-color: var(--alarm); border-width: 2px; }"
 SENTENCE = """
 p { margin: 2px 0 4px; }
@@ -83,20 +91,30 @@ h2 { font-size: 1rem; margin: 18px 0 6px; }
 a { color: var(--accent); }
 .alarm { color: var(--alarm); font-weight: 600; }
 .soft { color: var(--soft); }
+.warn { color: var(--warn); font-weight: 600; }
 """
+TICKS = """
+:host { position: relative; height: 1.5em; font-size: .72rem; color: var(--soft); }
+span { position: absolute; top: 0; white-space: nowrap; padding-top: 6px; line-height: 1.1; }
+span::before { content: ""; position: absolute; top: 0; left: 0; height: 5px; border-left: 1px solid
+  var(--soft); }
+.right { transform: translateX(-100%); } .right::before { left: 100%; }
+.middle { transform: translateX(-50%); } .middle::before { left: 50%; }
+"""
+TOOLTIP = ":host { max-width: min(300px, 88vw); font: 13px/1.4 system-ui, sans-serif; }"
 TILE_STYLES = """
-dl { display: grid; grid-template-columns: repeat(4, minmax(0, 1fr)); gap: 8px; margin: 0; }
+dl { display: grid; grid-template-columns: repeat(3, minmax(0, 1fr)); gap: 8px; margin: 0; }
 dl div { background: var(--wash); border-radius: 4px; padding: 6px 10px; }
 dt { font-size: .78rem; line-height: 1.25; color: var(--soft); }
-dd { margin: 1px 0 0; font-size: 1.22rem; font-weight: 650; font-variant-numeric: tabular-nums;
+dd { margin: 1px 0 0; font-size: 1.08rem; font-weight: 600; font-variant-numeric: tabular-nums;
   line-height: 1.25; }
 dd small { display: block; font-size: .78rem; font-weight: 400; color: var(--soft); min-height:
   1.25em; }
 dd small.difference { color: var(--accent); }
-dd span { font-size: .95rem; font-weight: 500; white-space: nowrap; }
+dd span { font-size: .88rem; font-weight: 500; white-space: nowrap; }
 dl.stale dd { opacity: .45; } dl.wrong { outline: 3px solid var(--alarm); }
-@media (min-width: 1800px) { dl { grid-template-columns: repeat(8, minmax(0, 1fr)); } }
-@media (max-width: 1100px) { dl { grid-template-columns: 1fr 1fr; } }
+@media (min-width: 1800px) { dl { grid-template-columns: repeat(6, minmax(0, 1fr)); } }
+@media (max-width: 760px) { dl { grid-template-columns: 1fr 1fr; } }
 @media (max-width: 480px) {
   dl div { padding: 6px 8px; } dd { font-size: 1.1rem; } dd span { font-size: .78rem; }
 }
@@ -104,6 +122,7 @@ dl.stale dd { opacity: .45; } dl.wrong { outline: 3px solid var(--alarm); }
 
 
 TABLE = """
+h2 { font-size: 1rem; margin: 18px 0 6px; }
 div { overflow-x: auto; }
 table { border-collapse: collapse; width: 100%; font-size: .86rem; font-variant-numeric:
   tabular-nums; }
@@ -130,6 +149,19 @@ def notes(lines: Sequence[str]) -> Markup:
     return Markup("<h2>Notes</h2>") + sentences(lines, "soft") if lines else Markup("")
 
 
+def headline(
+    result: ContactResult, pinned: ContactResult | None, *, state: str, stale: bool
+) -> Markup:
+    """Return regime, load share and resonance for the strip that stays visible."""
+    shown_tiles = [tile for tile in result.tiles if tile.key in HEADLINE]
+    parts = [_tile(tile, result, pinned, quantity(tile.key).short) for tile in shown_tiles]
+    regime = Markup("<div><dt>Regime</dt><dd>{}<small>{}</small></dd></div>").format(
+        result.regime, state
+    )
+    kind = "stale" if stale else "" if result.converged else "wrong"
+    return Markup('<dl class="{}">{}</dl>').format(kind, regime + Markup("").join(parts))
+
+
 def tiles(
     result_tiles: Sequence[ResultTile],
     result: ContactResult,
@@ -138,17 +170,22 @@ def tiles(
     stale: bool,
 ) -> Markup:
     """Return highlighted numbers with uncertainty and difference to a pinned contact."""
-    parts = []
-    for tile in result_tiles:
-        comparison = ""
-        if pinned is not None:
-            text = difference(tile.key, result.row.get(tile.key), pinned.row.get(tile.key))
-            comparison = Markup('<small class="difference">{} vs. pinned</small>').format(text)
-        number, _, unit = tile.value.partition(" ")
-        html = Markup("<div><dt>{}</dt><dd>{} <span>{}</span><small>{}</small>{}</dd></div>")
-        parts.append(html.format(tile.name, number, unit, tile.uncertainty, comparison))
+    parts = [_tile(tile, result, pinned, tile.name) for tile in result_tiles]
     kind = "stale" if stale else "" if result.converged else "wrong"
     return Markup('<dl class="{}">{}</dl>').format(kind, Markup("").join(parts))
+
+
+def _tile(
+    tile: ResultTile, result: ContactResult, pinned: ContactResult | None, name: str
+) -> Markup:
+    """Return a number with its name, uncertainty and difference to a pinned contact."""
+    comparison = ""
+    if pinned is not None:
+        text = difference(tile.key, result.row.get(tile.key), pinned.row.get(tile.key))
+        comparison = Markup('<small class="difference">{} vs. pinned</small>').format(text)
+    number, _, unit = tile.value.partition(" ")
+    html = Markup("<div><dt>{}</dt><dd>{} <span>{}</span><small>{}</small>{}</dd></div>")
+    return html.format(name, number, unit, tile.uncertainty, comparison)
 
 
 class InputWidget:
@@ -174,8 +211,10 @@ class InputWidget:
         else:
             self.text = TextInput(
                 title=title,
-                value=case_input.text,
-                description=case_input.meaning or None,
+                value=shown(case_input.text),
+                description=Tooltip(
+                    content=case_input.hint, position="bottom_center", stylesheets=[TOOLTIP]
+                ),
                 **self._style(),
             )
             self.text.on_change("value", self._typed)
@@ -184,17 +223,18 @@ class InputWidget:
                 title="",
                 show_value=False,
                 bar_color=BAR,
+                tooltips=False,
                 start=first,
                 end=last,
                 step=1,
                 value=self._slider_position(case_input.text),
                 sizing_mode="stretch_width",
                 stylesheets=[LOOK],
-                margin=(0, 12, 6, 12),
-                tags=[title, case_input.text],
+                margin=(0, 12, 0, 12),
+                tags=[title, shown(case_input.text)],
             )
             self.slider.on_change("value", self._slid)
-            parts = [self.text, self.slider]
+            parts = [self.text, self.slider, _ticks(case_input)]
         self.model = Column(
             *parts,
             self.error,
@@ -212,14 +252,15 @@ class InputWidget:
         position = self.case_input.position(text)
         return self.case_input.positions[0] if position is None else position
 
-    def show(self, text: str, message: str = "") -> None:
-        """Show a value, and the error message of an invalid one."""
+    def show(self, text: str, message: str = "", remark: str = "") -> None:
+        """Show a value, and the error message of an invalid one or a remark on a doubtful one."""
         self._updating = True
+        position = self.case_input.position(text) if self.slider is not None else None
+        text = shown(text)
         if self.text.value != text:
             if isinstance(self.text, Select) and text not in self.text.options:
                 self.text.options = [*self.text.options, text]
             self.text.value = text
-        position = self.case_input.position(text) if self.slider is not None else None
         if self.slider is not None and position is not None:
             if self.slider.value != position:
                 self.slider.value = position
@@ -227,17 +268,43 @@ class InputWidget:
             if self.slider.tags != tags:
                 self.slider.tags = tags
         self._updating = False
-        self.error.visible = bool(message)
-        self.error.text = sentences([f"{message.rstrip('.')}."] if message else [], "alarm")
+        self.error.visible = bool(message or remark)
+        line = message or remark
+        kind = "alarm" if message else "warn"
+        self.error.text = sentences([f"{line.rstrip('.')}."] if line else [], kind)
         self.text.stylesheets = [LOOK, WRONG] if message else [LOOK]
 
     def _typed(self, _name: str, _old: object, new: object) -> None:
         if not self._updating:
-            self._on_change(self.case_input.key, str(new))
+            self._on_change(self.case_input.key, written(str(new)))
 
     def _slid(self, _name: str, _old: object, new: object) -> None:
         if not self._updating:
             self._on_change(self.case_input.key, self.case_input.value_text(int(str(new))))
+
+
+def _ticks(case_input: CaseInput) -> Div:
+    """Return the ends of a slider and the value of the case, at their places below it."""
+    first, last = case_input.positions
+    own = case_input.position(case_input.text)
+    marks = {first: "left", last: "right"}
+    if own is not None and 0.2 < (own - first) / (last - first) < 0.8:
+        marks[own] = "middle"
+    html = Markup("").join(
+        Markup('<span class="{}" style="left: {:.4g}%">{}</span>').format(
+            kind,
+            100.0 * (position - first) / (last - first),
+            shown(case_input.value_text(position)),
+        )
+        for position, kind in marks.items()
+    )
+    return Div(
+        text=html,
+        sizing_mode="stretch_width",
+        stylesheets=[LOOK, TICKS],
+        margin=(0, 12, 6, 12),
+        html_attributes={"aria-hidden": "true"},
+    )
 
 
 def button(label: str, on_click: Callable[[], None]) -> Button:
@@ -275,6 +342,32 @@ class StaleMark:
 
 
 _MARK = 'document.documentElement.toggleAttribute("data-stale", source.data.stale[0])'
+
+
+class HeadlineStrip:
+    """Strip of the page that stays visible: its content, and a bar while the solver is compiled.
+
+    The strip is an element of the page, outside the figures: it is there before they are.
+    """
+
+    def __init__(self) -> None:
+        self.html = Markup("")
+        self._source = ColumnDataSource({"html": [""], "busy": [False]})
+        self._source.js_on_change("data", CustomJS(args={"source": self._source}, code=_STRIP))
+        self.model = Div(text="", visible=False, tags=[self._source])
+
+    def show(self, html: Markup, *, busy: bool) -> None:
+        """Show numbers; `busy`: the solver is being compiled."""
+        self.html = html
+        data = {"html": [str(html)], "busy": [busy]}
+        if self._source.data != data:
+            self._source.data = data
+
+
+_STRIP = """
+document.getElementById("headline").innerHTML = source.data.html[0]
+document.getElementById("compiling").hidden = !source.data.busy[0]
+"""
 
 
 class Download:

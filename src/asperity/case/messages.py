@@ -148,6 +148,8 @@ def _first_error(model: type[Section], error: ValidationError) -> LocatedError:
     if kind == "extra_forbidden":
         valid = _keys_of(model, keys[:-1])
         matches = get_close_matches(str(keys[-1]), valid, n=1)
+        inside = [] if len(keys) > 1 else _sections_with(model, str(keys[-1]))
+        matches = inside[:1] or matches
         remedy = f"did you mean {matches[0]}?" if matches else f"known here: {', '.join(valid)}"
         return LocatedError(keys, f"is not a known key; {remedy}")
     if kind == "missing":
@@ -164,6 +166,16 @@ def _keys_of(model: type[Section], keys: tuple[str | int, ...]) -> list[str]:
         if isinstance(key, str):
             model = next(_sections_in(model.model_fields[key].annotation))
     return [entry.alias or name for name, entry in model.model_fields.items()]
+
+
+def _sections_with(model: type[Section], key: str) -> list[str]:
+    """Return the dotted keys of the sections of a case that have a key, such as contact.load."""
+    return [
+        f"{name}.{key}"
+        for name, entry in model.model_fields.items()
+        for section in list(_sections_in(entry.annotation))[:1]
+        if key in section.model_fields
+    ]
 
 
 def _sections_in(annotation: object) -> Iterator[type[Section]]:

@@ -11,7 +11,9 @@ from typing import Annotated, TextIO
 import typer
 
 import asperity
+from asperity.cli import output
 from asperity.cli.options import with_options
+from asperity.cli.terminal.groups import GroupedCommands
 from asperity.core import quantities
 from asperity.core.errors import AsperityError, BadInput
 from asperity.core.processes import tune_memory_use
@@ -23,10 +25,11 @@ SUPERSCRIPTS = {chr(high): chr(low) for low, high in quantities.SUPERSCRIPTS.ite
 PLAIN = {"µ": "u", "−": "-", "–": "-", "±": "+-", "×": "x", "Λ": "lambda", "′": "'", **SUPERSCRIPTS}
 
 app = typer.Typer(
+    cls=GroupedCommands,
+    subcommand_metavar="COMMAND [ARGS]",
     help="Mixed lubrication, wear and vibration of rough contacts, and their condition monitoring.",
     epilog="Exit codes: 0 done, 2 bad input or usage, 1 anything else; of track and watch: "
     "3 alarm, 4 cannot tell, 5 sensor or machine off.",
-    add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
@@ -41,43 +44,60 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="plain")
+    given_arguments = sys.argv[1:] if arguments is None else list(arguments)
+    as_json = "--json" in given_arguments
     try:
-        given_arguments = sys.argv[1:] if arguments is None else list(arguments)
-        code = app(
-            args=given_arguments, prog_name="asperity", standalone_mode=False, obj=given_arguments
-        )
+        code = _run(given_arguments or ["--help"], as_json=as_json)
         sys.stdout.flush()
-        if code == INTERRUPTED:
-            code = _print_error("interrupted; no partial files were left", 1)
-    except BadInput as error:
-        code = _print_error(with_options(str(error)), 2)
-    except AsperityError as error:
-        code = _print_error(with_options(str(error)), 1)
-    except typer.Abort:  # raised by typer for an end of file in a library
-        code = _print_error("a file ended unexpectedly; read or copy it again", 1)
-    except typer.TyperException as error:  # usage
-        code = _print_error(
-            f"{error.format_message().rstrip('.')}; see asperity --help",
-            error.exit_code,
-        )
     except OSError as error:
         if error.filename is not None:
             raise
         code = _output_failed(error)
-    sys.exit(code)
+    sys.exit(code if given_arguments else 2)  # without a command, its list is shown
 
 
 def _no_output() -> TextIO:
     return open(os.devnull, "w", encoding="utf-8")  # noqa: PTH123
 
 
-def _print_error(sentence: str, code: int) -> int:
-    text = printable(sentence)
-    print(
-        f"error: {text if len(text) <= MAX_ERROR else f'{text[: MAX_ERROR - 3]}...'}",
-        file=sys.stderr,
+def _run(arguments: list[str], *, as_json: bool) -> int:
+    """Run a command and print its JSON object, with the error if there is one; return its code."""
+    output.discard_object()
+    code, sentence = _outcome(arguments)
+    error = None if sentence is None else _shortened(sentence)
+    if error is not None:
+        print(f"error: {error}", file=sys.stderr)
+    output.print_object(
+        {"error": {"message": error, "exit_code": code}} if as_json and error is not None else {}
     )
     return code
+
+
+def _outcome(arguments: list[str]) -> tuple[int, str | None]:
+    """Run a command; return its exit code, and the sentence of its error if it failed."""
+    try:
+        code = app(args=arguments, prog_name="asperity", standalone_mode=False, obj=arguments)
+    except BadInput as error:
+        return 2, with_options(str(error))
+    except AsperityError as error:
+        return 1, with_options(str(error))
+    except typer.Abort:  # raised by typer for an end of file in a library
+        return 1, "a file ended unexpectedly; read or copy it again"
+    except typer.TyperException as error:  # usage
+        context = getattr(error, "ctx", None)
+        command = "asperity" if context is None else context.command_path
+        sentence = error.format_message().rstrip(".")
+        see = " See" if sentence.endswith("?") else "; see"
+        return error.exit_code, f"{sentence}{see} {command} --help"
+    if code == INTERRUPTED:
+        return 1, "interrupted; no partial files were left"
+    return int(code or 0), None
+
+
+def _shortened(sentence: str) -> str:
+    """Return a message of at most `MAX_ERROR` printable characters."""
+    text = printable(sentence)
+    return text if len(text) <= MAX_ERROR else f"{text[: MAX_ERROR - 3]}..."
 
 
 def _output_failed(error: OSError) -> int:
@@ -85,9 +105,9 @@ def _output_failed(error: OSError) -> int:
     sys.stdout = _no_output()  # for exit handlers
     if isinstance(error, BrokenPipeError):  # the reader closed the pipe
         return 1
-    return _print_error(
-        f"the output could not be written: {error.strerror}; files of --out are complete", 1
-    )
+    sentence = f"the output could not be written: {error.strerror}; files of --out are complete"
+    print(f"error: {sentence}", file=sys.stderr)
+    return 1
 
 
 def _plain(error: UnicodeError) -> tuple[str, int]:

@@ -8,9 +8,8 @@ import typer
 from asperity import benchmark as certified
 from asperity import report
 from asperity.cli.app import app
-from asperity.cli.options import AsJson, Quiet, require_output
+from asperity.cli.options import AsJson, OutFiles, Quiet, require_output
 from asperity.cli.output import Block, columns, progress, show, written
-from asperity.core import files
 
 if TYPE_CHECKING:
     from asperity.benchmark import BenchmarkResult
@@ -32,18 +31,13 @@ def benchmark(
         Path | None,
         typer.Option(metavar="DIR", help="Folder of cases (default: those of asperity)."),
     ] = None,
-    out: Annotated[Path | None, typer.Option(metavar="CSV", help="Write all rows.")] = None,
-    figure: Annotated[
-        Path | None, typer.Option(metavar="PNG|PDF", help="Plot error over time.")
-    ] = None,
+    out: OutFiles = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Compare a solver with contacts of certified values: error and time of each."""
-    if out is not None:
-        require_output(out, ".csv")
-    if figure is not None:
-        files.require_writable(figure)
+    """Compare a solver with contacts of certified values."""
+    for path in out or ():
+        require_output(path, ".csv", ".png", ".pdf")
     chosen = certified.solver_named(solver)
     with progress(
         "benchmark", "solving ...", quiet=quiet, compiles=solver == "asperity"
@@ -51,15 +45,18 @@ def benchmark(
         result = certified.run_benchmark(
             chosen, folder=cases, cells=cells or (64, 128), progress=display
         )
-    saved = [] if out is None else [result.save(out)]
-    if figure is not None:
-        saved.append(report.write_figure(report.benchmark_figure(result), figure))
+    saved = [
+        result.save(path)
+        if path.suffix.lower() == ".csv"
+        else report.write_figure(report.benchmark_figure(result), path)
+        for path in out or ()
+    ]
     show(
         result.verdict(),
         lambda: result.scalars() | {"written": [str(path) for path in saved]},
         _rows(result),
         [f"  left out: {case}: {reason}" for case, reason in result.left_out],
-        written("  Written", *saved) if saved else [],
+        written("Written", *saved) if saved else [],
         as_json=as_json,
         quiet=quiet,
     )

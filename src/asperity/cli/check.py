@@ -23,7 +23,7 @@ MAX_DETAILED = 4  # recordings up to which `check` shows every fact
 @app.command()
 def check(
     paths: Annotated[
-        list[Path] | None, typer.Argument(metavar="FILE...", help="Recordings, or folders of them.")
+        list[Path] | None, typer.Argument(metavar="FILE", help="Recordings, or folders of them.")
     ] = None,
     data_set: Annotated[
         Path | None,
@@ -42,7 +42,7 @@ def check(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Check recordings: rate, unit, length, gaps, clipping, and for what they are good."""
+    """Check recordings, and what they are suitable for."""
     if data_set is not None:
         if paths:
             raise BadInput(

@@ -12,6 +12,7 @@ from asperity.cli.options import (
     Accuracy,
     AsJson,
     CaseOrRun,
+    OpenPage,
     Overrides,
     Quiet,
     StandingRoughness,
@@ -20,6 +21,7 @@ from asperity.cli.options import (
     require_output,
 )
 from asperity.cli.output import Block, Row, SolverSteps, known_rows, progress, show, table, text
+from asperity.cli.terminal.browser import open_page
 from asperity.core import files, processes
 from asperity.core.errors import AsperityError
 from asperity.core.quantities import quantity
@@ -29,6 +31,12 @@ if TYPE_CHECKING:
     from asperity.results import Run
 
 DEMO_SQ = ("0.5 um", "1.5 um", "3 um")
+MAIN = (  # quantities that `solve` prints without --all
+    *("clr", "car", "sq_m", "h_min_m", "h_mean_m", "lambda_ratio", "p_max_pa"),
+    *("friction_coefficient", "flash_temperature_max_k", "von_mises_max_pa", "crf_hz", "crfa"),
+)
+CONVERGENCE = ("converged", "iterations")  # stated by the row of the solver
+INTERVAL = ", 90 % interval"  # of a number whose own row states it
 
 
 @app.command()
@@ -36,10 +44,11 @@ def demo(
     out: Annotated[Path, typer.Option(help="Folder for the case, the runs and the report.")] = Path(
         "asperity-demo"
     ),
+    opened: OpenPage = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Solve the paper's contact at a few roughness levels, from case file to report."""
+    """Solve the paper's contact at three roughness levels."""
     files.make_folder(out)
     case_file = out / "paper.toml"
     page = out / "report.html"
@@ -63,6 +72,7 @@ def demo(
         as_json=as_json,
         quiet=quiet,
     )
+    open_page(page, requested=opened)
     unfinished = results.not_converged(runs)
     if unfinished:
         raise AsperityError(
@@ -70,36 +80,41 @@ def demo(
         )
 
 
+SurfacesOption = Annotated[
+    int | None,
+    typer.Option(
+        metavar="N",
+        min=1,
+        help="Surfaces to average (default: 5; fine grids: 3), or running tracks "
+        "(default: 1; measured: 3).",
+    ),
+]
+DynamicOption = Annotated[
+    bool, typer.Option("--dynamic", help="Compute frequency-dependent stiffness and damping.")
+]
+RunOption = Annotated[
+    Path | None, typer.Option(metavar="RUN.nc", help="File for the run, with its case.")
+]
+EverythingOption = Annotated[
+    bool, typer.Option("--all", help="Print all quantities and the notes in full.")
+]
+
+
 @app.command()
 def solve(
     path: CaseOrRun,
     surface: SurfaceFile = None,
     overrides: Overrides = None,
-    surfaces: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N",
-            min=1,
-            help="Surfaces to average (default: 5; fine grids: 3), or running tracks "
-            "(default: 1; measured: 3).",
-        ),
-    ] = None,
+    surfaces: SurfacesOption = None,
     accuracy: Accuracy = None,
     snapshot: StandingRoughness = False,
-    dynamic: Annotated[
-        bool,
-        typer.Option(
-            "--dynamic",
-            help="Compute frequency-dependent stiffness and damping.",
-        ),
-    ] = False,
-    out: Annotated[
-        Path | None, typer.Option(metavar="RUN.nc", help="Save the run, with its case.")
-    ] = None,
+    dynamic: DynamicOption = False,
+    out: RunOption = None,
+    everything: EverythingOption = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Solve one contact with running roughness: film, load sharing, contact resonance."""
+    """Solve one contact: film, load sharing, contact resonance."""
     require_output(out, ".nc")
     chosen = chosen_case(path, overrides, surface, accuracy, snapshot=snapshot)
     if surfaces is not None:
@@ -112,7 +127,8 @@ def solve(
     if out is not None:
         run.save(out)
     saved = [] if out is None else [f"Saved in {out}; asperity report {out} writes a page of it"]
-    show(run.verdict(), run.summary, run_table(run), saved, as_json=as_json, quiet=quiet)
+    rows = run_table(run) if everything else short_table(run)
+    show(run.verdict(), run.summary, rows, saved, as_json=as_json, quiet=quiet)
     if not run.converged:
         location = f"; the unfinished state is in {out}" if out is not None else ""
         raise AsperityError(f"not converged: {run.convergence_text}{location}")
@@ -141,11 +157,30 @@ def _solve(
         )
 
 
+def short_table(run: "Run") -> Block:
+    """Return the main numbers of a run, and the first sentence of each note."""
+    values = run.scalars()
+    main = [quantity(key) for key in MAIN if values.get(key) is not None]
+    rows = [(entry.title, entry.text_in(values)) for entry in main]
+    notes = [f"{note.partition('. ')[0].rstrip('.')}." for note in _notes(run)]
+    yield from table(rows, notes)
+    yield "  --all prints all quantities, the parts of the intervals and the notes in full."
+
+
+def _notes(run: "Run") -> list[str]:
+    failure = [] if run.friction_failure is None else [f"no friction: {run.friction_failure}"]
+    return [*run.remarks, *failure]
+
+
 def _numbers(run: "Run") -> Iterator[Row]:
-    """Yield the numbers of the catalogue; the central film of standing roughness is one spot."""
+    """Yield the numbers of the catalogue; the central film of standing roughness is one spot.
+
+    The solver's steps have a row of their own.
+    """
     central = quantity("h_central_m").title
     spot = run.running is None and run.state.sq > 0.0 and run.solution.lubricant is not None
-    for title, value in known_rows(run.scalars()):
+    values = {key: value for key, value in run.scalars().items() if key not in CONVERGENCE}
+    for title, value in known_rows(values):
         yield (
             title,
             f"{value}, at one spot of the roughness" if spot and title == central else value,
@@ -157,11 +192,14 @@ def run_table(run: "Run") -> Block:
     touching = 0.0 if run.solution.lubricant is None else run.solution.options.contact_film
     rows = [
         *_numbers(run),
-        *results.uncertainty_rows(run.error, run.friction_interval),
+        *(
+            row
+            for row in results.uncertainty_rows(run.error, run.friction_interval)
+            if not row[0].endswith(INTERVAL)
+        ),
         (quantity("contact_film_m").title, text("contact_film_m", touching)),
         ("cells", " x ".join(map(str, run.solution.grid.cells))),
         *run.card.rows(),
         ("solver", run.convergence_text),
     ]
-    failure = [] if run.friction_failure is None else [f"no friction: {run.friction_failure}"]
-    yield from table(rows, (*run.remarks, *failure))
+    yield from table(rows, _notes(run))

@@ -20,7 +20,7 @@ def export_command(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write the fields of a saved run: film, pressure, contact, stress, temperatures."""
+    """Write the fields of a saved run as a table or VTK image."""
     require_output(out, *results.FIELD_SUFFIXES, option="OUT")
     run = results.load_run(path)
     results.write_fields(run, out)

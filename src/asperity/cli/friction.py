@@ -1,7 +1,9 @@
 """`asperity stribeck` and `asperity traction`: friction over speed and slide-to-roll ratio."""
 
+import csv
 from collections.abc import Callable
 from dataclasses import asdict
+from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,7 +14,7 @@ from asperity.cli.app import app
 from asperity.cli.options import (
     AsJson,
     CaseOrRun,
-    OutPicture,
+    OutFiles,
     Overrides,
     Quiet,
     Roughness,
@@ -21,6 +23,7 @@ from asperity.cli.options import (
     require_output,
 )
 from asperity.cli.output import Block, columns, show, solver_progress, text, written
+from asperity.core import files
 from asperity.core.errors import AsperityError
 from asperity.core.quantities import quantity
 
@@ -42,11 +45,11 @@ def stribeck(
     sq: Roughness = None,
     overrides: Overrides = None,
     snapshot: StandingRoughness = False,
-    out: OutPicture = None,
+    out: OutFiles = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Compute friction over speed, from boundary lubrication to full film."""
+    """Compute friction over speed, up to full film."""
 
     def curve(chosen: "Case", step: "SolverProgress") -> "FrictionCurve":
         return results.stribeck_curve(chosen, speeds=speed, progress=step)
@@ -69,11 +72,11 @@ def traction(
     sq: Roughness = None,
     overrides: Overrides = None,
     snapshot: StandingRoughness = False,
-    out: OutPicture = None,
+    out: OutFiles = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Compute friction over the slide-to-roll ratio, from pure rolling."""
+    """Compute friction over the slide-to-roll ratio."""
 
     def curve(chosen: "Case", step: "SolverProgress") -> "FrictionCurve":
         return results.traction_curve(chosen, slips=slip, progress=step)
@@ -93,19 +96,24 @@ def _cases(
 def _friction_command(
     curve: "Callable[[Case, SolverProgress], FrictionCurve]",
     cases: "list[Case]",
-    out: Path | None,
+    out: list[Path] | None,
     *,
     as_json: bool,
     quiet: bool,
 ) -> None:
-    require_output(out, ".png")
+    for path in out or ():
+        require_output(path, ".csv", ".png", ".pdf")
     curves = []
     for chosen in cases:
         label = f"{chosen.source}, Sq {text('sq_m', chosen.surface().sq)}"
         with solver_progress(label, quiet=quiet) as step:
             curves.append(curve(chosen, step))
-    if out is not None:
-        report.write_figure(report.friction_figure(curves), out)
+    figures = [path for path in out or () if path.suffix.lower() != ".csv"]
+    tables = [path for path in out or () if path not in figures]
+    for path in figures:
+        report.write_figure(report.friction_figure(curves), path)
+    for path in tables:
+        files.write_text(path, _points_csv(curves))
     verdicts = [drawn.verdict() for drawn in curves]
     hints = {drawn.hint() for drawn in curves} - {None}
     show(
@@ -113,10 +121,11 @@ def _friction_command(
         lambda: {
             "verdict": " ".join(verdicts),
             "curves": [drawn.scalars() for drawn in curves],
-            "figures": [] if out is None else [str(out)],
+            "figures": [str(path) for path in figures],
+            "tables": [str(path) for path in tables],
         },
         *([f"  note: {hint}"] for hint in hints),
-        written("  Figure", out),
+        written("Written", *figures, *tables),
         *(_points(drawn) for drawn in curves),
         as_json=as_json,
         quiet=quiet,
@@ -124,6 +133,21 @@ def _friction_command(
     unfinished = sum(not point.converged for drawn in curves for point in drawn.points)
     if unfinished:
         raise AsperityError(f"not converged at {unfinished} marked points; do not use them")
+
+
+def _points_csv(curves: "list[FrictionCurve]") -> str:
+    """Return a csv row per point of all curves, in SI."""
+    rows = [{"sq_m": curve.sq, **asdict(point)} for curve in curves for point in curve.points]
+    buffer = StringIO()
+    writer = csv.DictWriter(buffer, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows({key: _shortest(value) for key, value in row.items()} for row in rows)
+    return buffer.getvalue()
+
+
+def _shortest(value: object) -> object:
+    """Return a float without the rounding errors of its last digits."""
+    return float(f"{value:.12g}") if isinstance(value, float) else value
 
 
 def _points(curve: "FrictionCurve") -> Block:

@@ -17,14 +17,16 @@ from asperity.cli.options import (
     Band,
     Channel,
     EmulatorFolder,
+    Figures,
     ForecastLimit,
     Method,
+    OpenPage,
     Overrides,
     Page,
     Quiet,
     Rate,
-    SampleSeed,
     Scale,
+    Seed,
     Shaft,
     StandingRoughness,
     SurfaceFile,
@@ -32,9 +34,9 @@ from asperity.cli.options import (
     Workers,
     Worn,
     chosen_case,
-    require_output,
 )
-from asperity.cli.output import Block, columns, progress, show, table, written
+from asperity.cli.output import Block, columns, named_path, progress, show, table, written
+from asperity.cli.terminal.browser import open_page, require_page
 from asperity.core import processes
 from asperity.core.errors import BadInput, require_choice
 from asperity.core.quantities import quantity
@@ -55,7 +57,7 @@ if TYPE_CHECKING:
 
 PathsArgument = Annotated[
     list[Path] | None,
-    typer.Argument(metavar="[FILE...]", help="Recordings, or folders of recordings."),
+    typer.Argument(metavar="FILE", help="Recordings, or folders of recordings."),
 ]
 CaseFileOption = Annotated[
     Path | None,
@@ -104,7 +106,7 @@ def infer(
     forecast: ForecastLimit = None,
     worn: Worn = None,
     design: DesignOption = None,
-    seed: SampleSeed = 0,
+    seed: Seed = 0,
     rate: Rate = None,
     unit: Unit = None,
     channel: Channel = None,
@@ -114,28 +116,29 @@ def infer(
     method: Method = None,
     workers: Workers = None,
     page: Page = None,
+    figures: Figures = None,
+    opened: OpenPage = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Infer the state of a contact from recordings, with intervals, and the next point to run."""
+    """Infer the state of a contact from recordings, with intervals."""
     case_file = _required(
         case_file, paths, sampler=sampler, forecast=forecast, worn=worn, design=design
     )
     setting, surface_notes = _setting(case_file, overrides, surface, snapshot=snapshot)
     limit = _limit(forecast, setting, worn)
-    history = None if worn is None else simulation.load_wear(worn)
-    require_output(page, ".html", option="--report")
+    require_page(page, requested=opened)
     source = _source(table_file, band, rate, unit, channel, scale, shaft, method)
     count = workers or processes.cores()
     observations = _observe(paths, setting, source, count, quiet=quiet)
     initial = emulated(setting, emulator, count, quiet=quiet)
-    forecaster = partial(_forecast, setting, observations, limit, history, seed)
+    forecaster = partial(_forecast, setting, observations, *limit, seed)
     ahead = forecaster(initial)
     latest = _latest(observations, ahead, surface_notes)
     result = _infer(setting, initial, latest, sampler, seed, extend, count, quiet=quiet)
     if result.emulator is not initial:
         ahead = forecaster(result.emulator)
-    _show(result, ahead, design, page, as_json=as_json, quiet=quiet)
+    _show(result, ahead, design, (page, figures), opened=opened, as_json=as_json, quiet=quiet)
 
 
 def _infer(
@@ -156,13 +159,18 @@ def _infer(
         return inference.refine_emulator(result, extend, sampler=by, workers=workers, progress=step)
 
 
-def _limit(forecast: str | None, setting: "Setting", worn: Path | None) -> "Limit | None":
-    """Return the limit whose crossing is forecast; None if none is requested."""
+def _limit(
+    forecast: str | None, setting: "Setting", worn: Path | None
+) -> tuple["Limit | None", "WearHistory | None"]:
+    """Return the limit whose crossing is forecast, and the wear simulation that is its prior.
+
+    Either is None if it is not given.
+    """
     if forecast is None:
-        return None
+        return None, None
     limit = inference.read_limit(forecast, setting)
     inference.require_limit(setting, limit, worn=worn is not None)
-    return limit
+    return limit, None if worn is None else simulation.load_wear(worn)
 
 
 def _source(
@@ -264,15 +272,19 @@ def _show(
     result: "Inference",
     ahead: "Forecast | None",
     design: float | None,
-    page: Path | None,
+    outputs: tuple[Path | None, Path | None],
     *,
+    opened: bool,
     as_json: bool,
     quiet: bool,
 ) -> None:
     """Print verdicts and tables, or all as JSON; exit with the alarm's code if there is one."""
+    page, figures = outputs
     designed = None
     if design is not None:
         designed = inference.design_contact(result.forward, result.draws.z, clr=design)
+    if figures is not None:
+        report.write_exhibits(report.inference_exhibits(result, ahead, designed), figures)
     if page is not None:
         report.write_inference_report(result, page, forecast=ahead, design=designed)
     verdicts = [outcome.sentence() for outcome in (ahead, designed) if outcome is not None]
@@ -280,13 +292,15 @@ def _show(
         "forecast": None if ahead is None else ahead.scalars(),
         "design": None if designed is None else designed.scalars(),
         "report": None if page is None else str(page),
+        **named_path("figures", figures),
     }
     blocks = (
         _posterior(result),
         _points(result),
         _models(result),
         _notes(result),
-        written("report", page),
+        written("Report", page),
+        written("Figures", figures),
     )
     show(
         [*verdicts, result.verdict()],
@@ -295,6 +309,7 @@ def _show(
         as_json=as_json,
         quiet=quiet,
     )
+    open_page(page, requested=opened)
     if ahead is not None and ahead.alarm:
         raise typer.Exit(EXIT_CODES["alarm"])
 

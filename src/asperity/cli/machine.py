@@ -11,6 +11,8 @@ from asperity import case, machines, report
 from asperity.cli.app import app
 from asperity.cli.options import (
     AsJson,
+    Figures,
+    OpenPage,
     OutFolder,
     Overrides,
     Quiet,
@@ -18,8 +20,9 @@ from asperity.cli.options import (
     Workers,
     read_overrides,
 )
-from asperity.cli.output import Block, Row, columns, progress, show, table
+from asperity.cli.output import Block, Row, columns, named_path, progress, show, table, written
 from asperity.cli.study import study_progress
+from asperity.cli.terminal.browser import open_page, require_opened
 from asperity.core import files
 from asperity.core.documents import Table
 from asperity.core.errors import AsperityError
@@ -70,10 +73,14 @@ def machine_command(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Print the contacts' conditions without solving.")
     ] = False,
+    figures: Figures = None,
+    opened: OpenPage = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Solve every contact of a machine: film, load sharing, friction, temperature."""
+    """Solve every contact of a gear pair, bearing, discs or cam."""
+    page = None if out is None or dry_run else out / PAGE
+    require_opened(page, requested=opened, option="--out DIR, without --dry-run")
     chosen = case.load_machine(path, read_overrides(overrides, snapshot=snapshot))
     if dry_run:
         result = machines.machine_conditions(chosen)
@@ -82,21 +89,18 @@ def machine_command(
             result = machines.solve_machine(chosen, out=out, workers=workers, progress=step)
         if out is not None:
             _save(result, out, quiet=quiet)
+    _draw(result, figures)
     show(
         result.verdict(),
-        result.scalars,
+        lambda: result.scalars() | named_path("figures", figures),
         _contacts(result),
         table([*_ratings(result), *_stiffness(result)]),
         table(_frequencies(result), [*result.notes, *_unsolved(result)]),
-        []
-        if out is None or dry_run
-        else [
-            f"Report: {out / PAGE}",
-            f"Saved in {out}; the same command resumes it",
-        ],
+        _written(page, out, figures),
         as_json=as_json,
         quiet=quiet,
     )
+    open_page(page, requested=opened)
     if result.failures:
         raise AsperityError(
             f"{len(result.failures)} of {len(result.rows)} contacts were not solved; the first: "
@@ -115,6 +119,19 @@ def _save(result: "MachineResult", out: Path, *, quiet: bool) -> None:
         report.write_machine_report(
             result, out / PAGE, opened=None if result.run is None else WORST_PAGE
         )
+
+
+def _draw(result: "MachineResult", figures: Path | None) -> None:
+    """Write the figures, if a folder for them is given."""
+    if figures is not None:
+        report.write_exhibits(report.machine_exhibits(result), figures)
+
+
+def _written(page: Path | None, out: Path | None, figures: Path | None) -> Block:
+    """Yield what was written, and where."""
+    yield from (*written("Report", page), *written("Figures", figures))
+    if page is not None:
+        yield f"Saved in {out}; the same command resumes it"
 
 
 def _ratings(result: "MachineResult") -> Iterator[Row]:

@@ -12,15 +12,16 @@ from asperity import report, simulation
 from asperity.cli.app import app
 from asperity.cli.options import (
     AsJson,
+    OpenPage,
     OutFolder,
     Overrides,
     Page,
     Quiet,
     SurfaceFile,
     chosen_case,
-    require_output,
 )
 from asperity.cli.output import Block, Row, progress, show, table, text, written
+from asperity.cli.terminal.browser import open_page, require_page
 from asperity.core.errors import AsperityError, BadInput, NotConverged
 from asperity.core.quantities import catalogue, quantity
 
@@ -67,11 +68,12 @@ def run(
     keep_going: KeepGoingOption = False,
     listen: ListenOption = False,
     page: Page = None,
+    opened: OpenPage = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Simulate the moving roughness: film, load sharing, friction and resonance, step by step."""
-    require_output(page, ".html", option="--report")
+    """Simulate the moving roughness step by step; resumable."""
+    require_page(page, requested=opened)
     chosen = chosen_case(path, overrides, surface)
     if steps is not None and passes is not None:
         raise BadInput(
@@ -107,6 +109,7 @@ def run(
         as_json=as_json,
         quiet=quiet,
     )
+    open_page(page, requested=opened)
     if failure is not None:
         raise AsperityError(failure)
 

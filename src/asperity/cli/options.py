@@ -78,21 +78,33 @@ SurfaceFile = Annotated[
     typer.Option("--surface", metavar="FILE", help="Measured surface that replaces the case's."),
 ]
 
+# --out takes the result of a command; the ending of a file gives its format
 OutFolder = Annotated[
     Path | None,
-    typer.Option("--out", metavar="DIR", help="Folder for results; resumes an interrupted run."),
+    typer.Option(
+        "--out",
+        metavar="DIR",
+        help="Folder for the result; the same command resumes an interrupted one.",
+    ),
 ]
-OutPicture = Annotated[Path | None, typer.Option("--out", metavar="PNG", help="Write a figure.")]
+OutFiles = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--out",
+        metavar="FILE",
+        help="File for the result: table (.csv) or figure (.png, .pdf); repeatable.",
+    ),
+]
 Page = Annotated[
     Path | None,
     typer.Option("--report", metavar="OUT.html", help="Write a self-contained HTML report."),
 ]
-StudyFigures = Annotated[
+Figures = Annotated[
     Path | None,
     typer.Option(
         "--figures",
         metavar="DIR",
-        help="Folder for a study's figures (PDF and PNG) and tables (csv).",
+        help="Folder for the figures as PDF, 85 and 175 mm wide; of a study, tables too.",
     ),
 ]
 
@@ -107,12 +119,12 @@ Roughness = Annotated[
 Cells = Annotated[
     int, typer.Option(metavar="N", min=8, help="Grid cells along each axis of the widest domain.")
 ]
-Seeds = Annotated[int, typer.Option(metavar="N", min=1, help="Surfaces averaged per point.")]
-SampleSeed = Annotated[int, typer.Option(metavar="SEED", min=0, help="Random seed.")]
+Surfaces = Annotated[int, typer.Option(metavar="N", min=1, help="Surfaces to average.")]
+Seed = Annotated[int, typer.Option(metavar="N", min=0, help="Seed of the random numbers.")]
 
 RecordingFiles = Annotated[
     list[Path] | None,
-    typer.Argument(metavar="FILE...", help="Recordings, or folders of recordings."),
+    typer.Argument(metavar="FILE", help="Recordings, or folders of recordings."),
 ]
 Rate = Annotated[
     float | None,
@@ -260,6 +272,9 @@ Method = Annotated[
     typer.Option(help="Detection method: joint, modes, likelihood or peak (the paper's)."),
 ]
 
+OpenPage = Annotated[
+    bool, typer.Option("--open", help="Open the report in the browser when it is written.")
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 Quiet = Annotated[
     bool, typer.Option("--quiet", "-q", help="Print the verdict only, without progress.")
@@ -293,6 +308,11 @@ def read_overrides(overrides: list[str] | None, *, snapshot: bool = False) -> di
     replaced: dict[str, object] = {"contact.roughness": "standing"} if snapshot else {}
     for override in overrides or []:
         key, equals, value = override.partition("=")
+        if equals and key.strip() and not value.strip():
+            raise BadInput(
+                f"--set {override} lacks a value after the equals sign; give one, such as "
+                "contact.load='400 N'"
+            )
         if not (equals and key.strip() and value.strip()):
             raise BadInput(
                 f"--set must be KEY=VALUE such as contact.load='400 N', got {override!r}"

@@ -3,13 +3,14 @@
 import json
 import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from textwrap import wrap
+from time import monotonic
 from typing import TYPE_CHECKING, Protocol
 
 from asperity.cli.options import with_options
+from asperity.cli.terminal.layout import fitted, layout, terminal_width
 from asperity.core.documents import Table
 from asperity.core.quantities import catalogue, quantity, select
 from asperity.core.third_party import printable
@@ -17,11 +18,14 @@ from asperity.core.third_party import printable
 if TYPE_CHECKING:
     from asperity.ehl import Iteration
 
+FIRST_LINE_S, MAX_LINE_DELAY_S = 5.0, 600.0  # between lines of progress without a terminal
 NOTICE_DELAY_S = 2.0  # without a solver step, after which compilation is announced
-TITLE = 12  # characters of a column's title, above which it is wrapped
 
 Block = Iterable[str]  # lines, evaluated only when printed
 Row = tuple[str, str]
+
+
+_pending: dict[str, object] = {}  # the JSON object of the command, until it ends
 
 
 def show(
@@ -32,21 +36,51 @@ def show(
     quiet: bool,
     a_line: bool = False,
 ) -> None:
-    """Print the values as one JSON object, or verdicts and, unless quiet, blocks after empty lines.
+    """Take the values as the JSON object, or print verdicts and, unless quiet, blocks of lines.
 
-    `a_line` prints the object on one line and flushes it, for a command that prints one after
-    another. Nan or infinity in the object is an internal error.
+    An empty line precedes each block. `print_object` prints the object when the command ends.
+    `a_line` prints it at once, on one line, for a command that prints one after another.
     """
+    sentences = [verdict] if isinstance(verdict, str) else verdict
     if as_json:
-        print(json.dumps(values(), indent=None if a_line else 2, allow_nan=False), flush=a_line)
+        taken = {"verdict": " ".join(map(with_options, sentences)), **values()}
+        if a_line:
+            print(_json(taken, indent=None), flush=True)
+        else:
+            _pending.update(taken)
         return
-    for sentence in [verdict] if isinstance(verdict, str) else verdict:
-        print(printable(with_options(sentence)), flush=a_line)
+    for sentence in sentences:
+        print_line(sentence, flush=a_line)
     if quiet:
         return
     for block in blocks:
         for number, line in enumerate(block):
-            print("" if number else "\n", printable(with_options(line)), sep="", flush=a_line)
+            if not number:
+                print(flush=a_line)
+            print_line(line, flush=a_line)
+
+
+def print_line(line: str, *, flush: bool = False) -> None:
+    """Print a line, continued on further lines where it is wider than the terminal."""
+    for part in fitted(printable(with_options(line)), terminal_width()):
+        print(part, flush=flush)
+
+
+def discard_object() -> None:
+    """Forget the JSON object of an earlier command of this process."""
+    _pending.clear()
+
+
+def print_object(error: Mapping[str, object]) -> None:
+    """Print the command's JSON object, completed by its error; nothing without either."""
+    if _pending or error:
+        print(_json({**_pending, **error}, indent=2))
+    discard_object()
+
+
+def _json(values: Mapping[str, object], *, indent: int | None) -> str:
+    """Return the text of an object; nan or infinity in it is an internal error."""
+    return json.dumps(values, indent=indent, allow_nan=False)
 
 
 def table(rows: Iterable[Row], notes: Iterable[str] = ()) -> Block:
@@ -59,22 +93,7 @@ def table(rows: Iterable[Row], notes: Iterable[str] = ()) -> Block:
 
 def columns(titles: Sequence[str], rows: Iterable[Sequence[str]], *, left: int = 0) -> Block:
     """Format a table; the first `left` columns and untitled ones are flush left."""
-    cells = [list(row) for row in rows]
-    widths = [max(map(len, column), default=1) for column in zip(*cells, strict=True)] or [1] * len(
-        titles
-    )
-    headings = [wrap(title, max(TITLE, width)) for title, width in zip(titles, widths, strict=True)]
-    widths = [
-        max(width, *map(len, heading), 1) for width, heading in zip(widths, headings, strict=True)
-    ]
-    height = max(map(len, headings))
-    stacked = zip(*([""] * (height - len(heading)) + heading for heading in headings), strict=True)
-    for line in (*stacked, *cells):
-        aligned = (
-            f"{cell:<{width}}" if number < left or not title else f"{cell:>{width}}"
-            for number, (title, cell, width) in enumerate(zip(titles, line, widths, strict=True))
-        )
-        yield f"  {'  '.join(aligned)}".rstrip()
+    yield from layout(titles, [list(row) for row in rows], left=left, width=terminal_width())
 
 
 def known_rows(values: Table, *groups: str) -> list[Row]:
@@ -101,6 +120,11 @@ def written(name: str, *paths: Path | None) -> Block:
     return [f"{name}: {path}" for path in paths if path is not None]
 
 
+def named_path(key: str, path: Path | None) -> dict[str, str]:
+    """Return a written path for `--json`; nothing for None."""
+    return {} if path is None else {key: str(path)}
+
+
 class Display(Protocol):
     """Progress display: a text, and a number of completed items of a total."""
 
@@ -109,15 +133,46 @@ class Display(Protocol):
 
 
 @contextmanager
+def _log(label: str, doing: str, notice: str | None) -> Iterator[Display]:
+    """Show progress as lines of a log, with a notice unless an iteration is completed soon."""
+    start_s = monotonic()
+    ended = threading.Event()
+    state = doing or "working ..."
+    announcement = threading.Timer(
+        NOTICE_DELAY_S, print, [notice], {"file": sys.stderr, "flush": True}
+    )
+
+    def print_lines() -> None:
+        delay_s = FIRST_LINE_S
+        while not ended.wait(delay_s):
+            elapsed = f"{monotonic() - start_s:.0f} s so far"
+            print(f"{label}: {state} ({elapsed})", file=sys.stderr, flush=True)
+            delay_s = min(2.0 * delay_s, MAX_LINE_DELAY_S)
+
+    def take(doing: str) -> None:
+        nonlocal state
+        state = doing
+        announcement.cancel()
+
+    threading.Thread(target=print_lines, daemon=True).start()
+    try:
+        with nullcontext() if notice is None else _announced(announcement):
+            yield lambda doing, *_, **__: take(doing)
+    finally:
+        ended.set()
+
+
+@contextmanager
 def progress(
-    label: str, doing: str = "", *, quiet: bool, compiles: bool = False
+    label: str, doing: str = "", *, quiet: bool, compiles: bool = False, log: bool = True
 ) -> Iterator[Display]:
-    """Show progress on a terminal.
+    """Show progress on a terminal, otherwise (with `log`) as lines at growing intervals.
 
     With `compiles`, the compilation at the first solve after installation is announced after a
-    delay, also if stderr is not a terminal.
+    delay.
     """
-    if quiet or not (compiles or sys.stderr.isatty()):
+    terminal = sys.stderr.isatty()
+    if quiet or not (terminal or log):
         yield _unseen
         return
     label = printable(label)
@@ -125,12 +180,9 @@ def progress(
         f"{label}: no iteration yet; the first solve after installation compiles the solver, "
         "up to a minute ..."
     )
-    if not sys.stderr.isatty():
-        announcement = threading.Timer(
-            NOTICE_DELAY_S, print, [notice], {"file": sys.stderr, "flush": True}
-        )
-        with _announced(announcement):
-            yield lambda *_, **__: announcement.cancel()
+    if not terminal:
+        with _log(label, doing, notice if compiles else None) as display:
+            yield display
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn

@@ -12,7 +12,7 @@ from asperity.core.errors import BadInput
 PageSource = Annotated[
     Path | None,
     typer.Argument(
-        metavar="[CASE.toml|RUN.nc|STUDY|FOLDER]",
+        metavar="CASE.toml|RUN.nc|STUDY|FOLDER",
         help="Case, run, or folder of a study, history or recordings (default: paper's contact).",
     ),
 ]
@@ -33,12 +33,13 @@ Listen = Annotated[
 def page_command(
     source: PageSource = None, port: Port = 5006, listen: Listen = "127.0.0.1"
 ) -> None:
-    """Serve a page to explore a contact, or to view recordings, a study or a history."""
+    """Explore a contact, recordings or a study in the browser."""
     try:
-        from asperity.app import open_page, serve_page
+        from asperity.app import ReportTools, open_page, serve_page
 
         opened = open_page(source)
-        serve_page(opened, port=port, listen=listen, ready=_ready, write_report=report.write_report)
+        tools = ReportTools(report.write_report, report.machine_drawing)
+        serve_page(opened, port=port, listen=listen, ready=_ready, tools=tools)
     except ModuleNotFoundError as missing:
         if (missing.name or "").partition(".")[0] not in (
             "panel",

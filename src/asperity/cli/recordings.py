@@ -28,11 +28,13 @@ from asperity.cli.options import (
     Contact,
     EmulatorFolder,
     FalseAlarms,
+    Figures,
     ForecastLimit,
     Machine,
     Method,
     Mqtt,
     OnAlarm,
+    OpenPage,
     Page,
     Point,
     Quiet,
@@ -54,6 +56,7 @@ from asperity.cli.options import (
     require_output,
 )
 from asperity.cli.output import progress
+from asperity.cli.terminal.browser import require_opened
 from asperity.core import files, processes
 from asperity.core.errors import BadInput
 
@@ -67,7 +70,7 @@ if TYPE_CHECKING:
 DataFiles = Annotated[
     list[Path] | None,
     typer.Option(
-        metavar="FILE", help="Write the table (.csv, .parquet) or all data (.nc); repeatable."
+        metavar="FILE", help="File for the table (.csv, .parquet) or all data (.nc); repeatable."
     ),
 ]
 SeriesTable = Annotated[
@@ -161,13 +164,15 @@ def track(
     point: Point = None,
     sensor: SensorName = None,
     page: Page = None,
+    figures: Figures = None,
+    opened: OpenPage = False,
     out: DataFiles = None,
     workers: Workers = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Track the contact resonance through recordings: stage of wear, alarm and forecast."""
-    _require_outputs(out or (), page, store)
+    """Evaluate recordings: wear stage, alarm and forecast."""
+    _require_outputs(out or (), page, store, opened=opened)
     if series is not None:
         track_series(SimpleNamespace(**locals()))
         return
@@ -197,8 +202,8 @@ def track(
             sensor=sensor,
             acknowledge=acknowledge,
         )
-    saved = write_track(tracked, out or (), page)
-    show_track(tracked, page, saved, store, as_json=as_json, quiet=quiet)
+    saved = write_track(tracked, out or (), page, figures)
+    show_track(tracked, page, saved, store, opened=opened, as_json=as_json, quiet=quiet)
     end_with(tracked.alarm.state)
 
 
@@ -242,7 +247,10 @@ def watch(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Track recordings as they arrive in a folder, until Ctrl-C; a later watch continues it."""
+    """Evaluate recordings as they arrive in a folder.
+
+    It ends with Ctrl-C; a later watch continues it.
+    """
     options = SimpleNamespace(**locals())
     if folder.is_file() and folder.suffix.lower() in monitoring.SERIES_SUFFIXES:
         watch_series(options, _states(tell))
@@ -325,8 +333,11 @@ def _given(paths: list[Path] | None) -> list[Path]:
     return paths
 
 
-def _require_outputs(out: "Sequence[Path]", page: Path | None, store: Path | None) -> None:
-    """Raise BadInput for an output that cannot be written."""
+def _require_outputs(
+    out: "Sequence[Path]", page: Path | None, store: Path | None, *, opened: bool
+) -> None:
+    """Raise BadInput for an output that cannot be written or opened."""
+    require_opened(page, requested=opened)
     for path in (page, store):
         if path is not None:
             files.require_writable(path)
@@ -370,7 +381,7 @@ def _show_updates(
     """Write and show every update until Ctrl-C."""
     presence = None if mqtt is None or display.once else monitoring.Presence(mqtt)
     with ExitStack() as stack:
-        step = stack.enter_context(_reading_progress("watching ...", quiet=quiet))
+        step = stack.enter_context(_reading_progress("watching ...", quiet=quiet, log=False))
         stack.enter_context(termination())
         if presence is not None:
             stack.callback(presence.close)
@@ -394,10 +405,12 @@ def _states(tell: str | None) -> "Sequence[AlarmState]":
 
 
 @contextmanager
-def _reading_progress(activity: str, *, quiet: bool) -> "Iterator[Callable[[Reading], None]]":
+def _reading_progress(
+    activity: str, *, quiet: bool, log: bool = True
+) -> "Iterator[Callable[[Reading], None]]":
     """Show the count of files on a terminal as they are read."""
     count = 0
-    with progress("recordings", activity, quiet=quiet) as display:
+    with progress("recordings", activity, quiet=quiet, log=log) as display:
 
         def step(recording: "Reading") -> None:
             nonlocal count

@@ -8,7 +8,7 @@ import typer
 
 from asperity import case, paper, simulation
 from asperity.cli.app import app
-from asperity.cli.options import AsJson, Quiet, case_at
+from asperity.cli.options import AsJson, Quiet, Seed, case_at
 from asperity.cli.output import Row, known_rows, progress, show, span, table
 from asperity.core.errors import BadInput
 from asperity.core.quantities import quantity
@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 
 OutOption = Annotated[
     Path,
-    typer.Option(metavar="DIR", help="New folder for recordings, table, true values and case."),
+    typer.Option(
+        metavar="DIR", help="Folder for recordings, table, true values and case; new or empty."
+    ),
 ]
 CaseFileOption = Annotated[
     Path | None,
@@ -63,7 +65,6 @@ TrendOption = Annotated[
 FileFormatOption = Annotated[
     str, typer.Option("--format", help="File format: h5 (with rate and unit) or wav.")
 ]
-SeedOption = Annotated[int, typer.Option(help="Random seed.")]
 
 
 @app.command()
@@ -80,11 +81,11 @@ def rig(
     modes: ModesOption = 4,
     trend: TrendOption = "knee",
     file_format: FileFormatOption = "h5",
-    seed: SeedOption = 7,
+    seed: Seed = 7,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Simulate the paper's wear test: recordings for asperity track, and the true values."""
+    """Simulate the recordings of a wear test, with true values."""
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise BadInput(f"--out {out} exists and is not an empty folder; name a new one")
     history = _wear(worn, hours, case_file)

@@ -14,12 +14,11 @@ from asperity.cli.options import (
     OutFolder,
     Overrides,
     Quiet,
-    SampleSeed,
-    Seeds,
+    Seed,
+    Surfaces,
     Workers,
     chosen_case,
     lengths,
-    require_output,
 )
 from asperity.cli.output import Block, columns, show, table
 from asperity.cli.study import study_progress
@@ -68,10 +67,6 @@ SqOption = Annotated[
 LevelsOption = Annotated[
     int, typer.Option(metavar="N", min=0, help="Roughness levels, for the knee of CRF.")
 ]
-FigureOption = Annotated[
-    Path | None,
-    typer.Option(metavar="PNG|PDF", help="Plot effects of the factors per outcome."),
-]
 
 
 @app.command()
@@ -84,19 +79,17 @@ def sensitivity(
     sq: SqOption = None,
     levels: LevelsOption = 8,
     cells: Cells = 128,
-    seeds: Seeds = 1,
-    sample_seed: SampleSeed = 0,
+    surfaces: Surfaces = 1,
+    seed: Seed = 0,
     overrides: Overrides = None,
     workers: Workers = None,
     out: OutFolder = None,
-    figure: FigureOption = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Find the open choices that affect CAR, CLR, CRF, CRFA and the knee of the curve most."""
+    """Rank inputs by their effect on CAR, CLR, CRF and CRFA."""
     size = _sample_size(method, trajectories, samples)
     chosen = chosen_case(path, overrides)
-    require_output(figure, ".png", ".pdf", option="--figure")
     if out is not None:
         files.make_folder(out)
     with study_progress(chosen.source, quiet=quiet) as step:
@@ -109,8 +102,8 @@ def sensitivity(
                 sq=lengths("--sq", sq) or study.SQ_LEVELS,
                 levels=levels,
                 cells=cells,
-                seeds=seeds,
-                sample_seed=sample_seed,
+                seeds=surfaces,
+                sample_seed=seed,
             ),
             out=None if out is None else out / "study",
             workers=workers,
@@ -118,10 +111,9 @@ def sensitivity(
         )
     saved: dict[str, str] = {}
     if out is not None:
-        saved["effects"] = str(out / "effects.csv")
         files.write_csv(out / "effects.csv", result.effects)
-    if figure is not None:
-        saved["figure"] = str(report.write_figure(report.sensitivity_figure(result), figure))
+        figure = report.write_figure(report.sensitivity_figure(result), out / "effects.png")
+        saved = {"effects": str(out / "effects.csv"), "figure": str(figure)}
     show(
         result.verdict(),
         lambda: {**result.scalars(), **saved},
@@ -221,17 +213,17 @@ def calibrate(
     free: FreeOption = None,
     level: LevelOption = None,
     cells: Cells = 128,
-    seeds: Seeds = 3,
+    surfaces: Surfaces = 3,
     screened: ScreenedOption = 32,
     starts: StartsOption = 2,
-    sample_seed: SampleSeed = 0,
+    seed: Seed = 0,
     overrides: Overrides = None,
     workers: Workers = None,
     out: OutFolder = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Fit free quantities so that the wear curve meets anchors, and report what stays open."""
+    """Fit free quantities so that the wear curve meets anchors."""
     targets = paper.PAPER_ANCHORS if anchors is None else paper.load_anchors(anchors)
     chosen = chosen_case(path, overrides)
     if out is not None:
@@ -244,10 +236,10 @@ def calibrate(
                 free=free,
                 levels=lengths("--level", level),
                 cells=cells,
-                seeds=seeds,
+                seeds=surfaces,
                 screened=screened,
                 starts=starts,
-                sample_seed=sample_seed,
+                sample_seed=seed,
             ),
             out=out,
             workers=workers,
@@ -269,7 +261,7 @@ def calibrate(
         _effort(result),
         table(after)
         if after
-        else ["  Nothing is saved; --out DIR saves the calibrated case, tables and figure."],
+        else ["Nothing is saved; --out DIR saves the calibrated case, tables and figure."],
         as_json=as_json,
         quiet=quiet,
     )

@@ -22,7 +22,7 @@ def store(
     out: Annotated[
         list[Path] | None,
         typer.Option(
-            metavar="FILE", help="Write all recordings as rows (.parquet, .csv); repeatable."
+            metavar="FILE", help="File for all recordings as rows (.parquet, .csv); repeatable."
         ),
     ] = None,
     acknowledge: Annotated[
@@ -32,7 +32,10 @@ def store(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Show the state of every sensor in a store; the most severe sets the exit code."""
+    """Show the state of every sensor in a store.
+
+    The most severe state sets the exit code.
+    """
     for path in out or ():
         require_output(path, ".csv", ".parquet")
     if acknowledge is not None:
@@ -57,7 +60,7 @@ def store(
         )
         if rows
         else [],
-        written("  Written", *exported),
+        written("Written", *exported),
         as_json=as_json,
         quiet=quiet,
     )

@@ -12,18 +12,20 @@ from asperity import case, machines, report, study
 from asperity.cli.app import app
 from asperity.cli.options import (
     AsJson,
+    Figures,
+    OpenPage,
     OutFolder,
     Overrides,
     Page,
     Quiet,
     StandingRoughness,
-    StudyFigures,
     Workers,
     chosen_case,
     read_overrides,
     require_output,
 )
 from asperity.cli.output import Block, columns, progress, show, table, text
+from asperity.cli.terminal.browser import open_page, require_opened
 from asperity.core.errors import AsperityError, BadInput
 from asperity.core.quantities import quantity
 
@@ -78,13 +80,15 @@ def study_command(
     snapshot: StandingRoughness = False,
     dry_run: DryRunOption = False,
     page: Page = None,
-    figures: StudyFigures = None,
+    opened: OpenPage = False,
+    figures: Figures = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Sweep a case: every point of its [study], on several surfaces each; resumable."""
+    """Sweep quantities of a case, on several surfaces; resumable."""
     part = _shard(shard)
     _require_places(out, page, dry_run=dry_run)
+    require_opened(page, requested=opened)
     if _has_machine(path):
         _refuse_for_machine(page, figures, merge, executor, fields, retry_failed, part != (1, 1))
         replaced = read_overrides(overrides, snapshot=snapshot)
@@ -109,6 +113,7 @@ def study_command(
         )
     page_rows = _make_page(result, page, figures, quiet=quiet)
     _show_result(result, page_rows, as_json=as_json, quiet=quiet)
+    open_page(page, requested=opened)
     return _require_whole(result, part)
 
 

@@ -7,7 +7,7 @@ import typer
 
 from asperity import case, report, surface
 from asperity.cli.app import app
-from asperity.cli.options import AsJson, LateralUnit, OutPicture, Quiet, Unit, require_output
+from asperity.cli.options import AsJson, LateralUnit, Quiet, Unit, require_output
 from asperity.cli.output import Block, Row, known_rows, show, table, written
 from asperity.core.errors import BadInput
 from asperity.core.quantities import select
@@ -16,7 +16,10 @@ if TYPE_CHECKING:
     from asperity.surface import SurfaceDescription
 
 
-FilesArgument = Annotated[list[Path], typer.Argument(metavar="FILE...", help="Measured surfaces.")]
+FilesArgument = Annotated[list[Path], typer.Argument(metavar="FILE", help="Measured surfaces.")]
+OutMap = Annotated[
+    Path | None, typer.Option("--out", metavar="PNG", help="File for the map of the heights.")
+]
 PixelOption = Annotated[
     str | None,
     typer.Option(metavar="LENGTH", help="Sample spacing of a bare matrix, such as '1.6 um'."),
@@ -48,7 +51,7 @@ LFilterOption = Annotated[
 @app.command("surface")
 def surface_command(
     files: FilesArgument,
-    out: OutPicture = None,
+    out: OutMap = None,
     unit: Unit = None,
     lateral_unit: LateralUnit = None,
     pixel: PixelOption = None,
@@ -60,7 +63,7 @@ def surface_command(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Describe a surface file: size, pixel, missing data, processing, parameters."""
+    """Describe surface files: size, missing data, parameters."""
     require_output(out, ".png")
     if out is not None and len(files) > 1:
         raise BadInput(

@@ -70,7 +70,10 @@ def vibrate(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Run the vibration model alone, dry with all load on asperities, or the paper's Table 1."""
+    """Run the vibration model alone, or the paper's Table 1.
+
+    The contact is dry, with all load on asperities.
+    """
     if path is None and not table1:
         raise BadInput(
             "a case is missing; asperity vibrate CASE.toml, or asperity vibrate --table1"
@@ -113,7 +116,7 @@ def _vibrate(chosen: "Case", figures: Path | None, *, as_json: bool, quiet: bool
         vibrated.verdict(),
         lambda: scalars | {"figures": [str(figure) for figure in drawn]},
         table(rows),
-        written("  Figure", *drawn),
+        written("Figure", *drawn),
         as_json=as_json,
         quiet=quiet,
     )
@@ -142,7 +145,7 @@ def _table1(
             "figures": [str(figure) for figure in drawn],
         },
         _printed_and_ours(rows),
-        written("  Figure", *drawn),
+        written("Figure", *drawn),
         as_json=as_json,
         quiet=quiet,
     )

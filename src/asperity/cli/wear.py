@@ -12,6 +12,7 @@ from asperity.cli.app import app
 from asperity.cli.options import (
     AsJson,
     LateralUnit,
+    OpenPage,
     OutFolder,
     Overrides,
     Page,
@@ -21,9 +22,9 @@ from asperity.cli.options import (
     Unit,
     Workers,
     chosen_case,
-    require_output,
 )
 from asperity.cli.output import Block, columns, progress, show, span, table, written
+from asperity.cli.terminal.browser import open_page, require_page
 from asperity.core.errors import BadInput
 from asperity.core.processes import cores
 from asperity.core.quantities import quantity
@@ -61,7 +62,7 @@ BODY_COLUMNS = (
 
 PathArgument = Annotated[
     Path | None,
-    typer.Argument(metavar="[CASE.toml]", help="Case, with [wear] for how it wears."),
+    typer.Argument(metavar="CASE.toml", help="Case, with [wear] for how it wears."),
 ]
 HoursOption = Annotated[float | None, typer.Option(metavar="H", help="Hours of running.")]
 FitOption = Annotated[
@@ -99,6 +100,7 @@ def wear(
     out: OutFolder = None,
     workers: Workers = None,
     page: Page = None,
+    opened: OpenPage = False,
     fit: FitOption = None,
     scar: ScarOption = None,
     unit: Unit = None,
@@ -110,7 +112,7 @@ def wear(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Simulate wear over hours: surfaces, load sharing, film, resonance; or fit k to a test."""
+    """Simulate wear over hours, or fit a wear coefficient to a test."""
     if fit is not None or scar is not None:
         if fit is None or scar is None or path is not None or hours is not None:
             raise BadInput(
@@ -133,12 +135,13 @@ def wear(
             "asperity wear needs a case and --hours, or --fit TRACE and --scar PROFILE; state "
             "either pair"
         )
-    require_output(page, ".html", option="--report")
+    require_page(page, requested=opened)
     chosen = chosen_case(path, overrides, surface, snapshot=snapshot)
     history = _simulate(chosen, path.name, hours, out, workers or cores(), quiet=quiet)
     if page is not None:
         report.write_wear_report(history, page)
     _show(history, page, as_json=as_json, quiet=quiet)
+    open_page(page, requested=opened)
 
 
 def _show(history: "WearHistory", page: Path | None, *, as_json: bool, quiet: bool) -> None:
@@ -148,8 +151,8 @@ def _show(history: "WearHistory", page: Path | None, *, as_json: bool, quiet: bo
         _contact(history),
         _bodies(history),
         table([], history.notes),
-        written("saved in", history.folder),
-        written("report", page),
+        written("Saved in", history.folder),
+        written("Report", page),
         as_json=as_json,
         quiet=quiet,
     )

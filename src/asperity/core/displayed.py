@@ -1,5 +1,6 @@
 """Results in Python: a short text, a table with a picture in notebooks, and drawings."""
 
+import sys
 from base64 import b64encode
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
@@ -45,6 +46,8 @@ class Displayed(Brief):
     def plot(self, drawing: str = "") -> "Axes":
         """Draw the result and return the first axes of a matplotlib figure.
 
+        Where pyplot is imported, its `show` shows the figure, as notebooks do at the end of a cell.
+
         Parameters
         ----------
         drawing : its name; default: the first one. A wrong name lists them.
@@ -54,7 +57,9 @@ class Displayed(Brief):
         BadInput
             for an unknown drawing.
         """
-        return _figure(self, drawing).axes[0]
+        figure = _figure(self, drawing)
+        _register(figure)
+        return figure.axes[0]
 
     def _repr_html_(self) -> str:
         """Return the verdict, a small table and the first drawing, for notebooks."""
@@ -102,6 +107,16 @@ def _figure(value: Displayed, drawing: str = "") -> "Figure":
     # loaded by name: drawing is above all results, and most of them are never drawn
     figure: Figure = import_module("asperity.report").draw_result(value, drawing)
     return figure
+
+
+def _register(figure: "Figure") -> None:
+    """Let pyplot manage a figure, if it is imported."""
+    pyplot = sys.modules.get("matplotlib.pyplot")
+    if pyplot is not None:
+        from matplotlib._pylab_helpers import Gcf
+
+        number = max(pyplot.get_fignums(), default=0) + 1
+        Gcf._set_new_active_manager(pyplot.new_figure_manager(number, FigureClass=lambda: figure))
 
 
 def _picture(value: Displayed) -> str:

@@ -18,7 +18,8 @@ from asperity.core.errors import require_positive
 
 NO_VALUE = "–"
 UNKNOWN = "± not determined"  # interval of a number
-BOUNDED = ("load", "film")  # groups of non-negative quantities: shares and film thicknesses
+# groups of non-negative quantities: shares, film thicknesses, friction
+BOUNDED = ("load", "sharing", "film", "friction")
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 # display units per SI unit; any other display unit is the SI unit itself
 _FACTORS = {
@@ -181,17 +182,21 @@ class Quantity:
         self, value: float | None, deviation: float | None
     ) -> tuple[float, float] | None:
         """Return value ± deviation clipped to the physical range; None where nothing is clipped."""
-        if (
-            self.group not in BOUNDED
-            or value is None
-            or not deviation
-            or not math.isfinite(value + deviation)
-        ):
+        if value is None or not deviation or not math.isfinite(value + deviation):
             return None
-        most = 1.0 if (self.unit, self.display) == ("1", "%") and value <= 1.0 else math.inf
-        low = max(0.0, value - deviation)
-        high = min(most, value + deviation)
+        low, high = self.within_range(value, value - deviation, value + deviation)
         return None if (low, high) == (value - deviation, value + deviation) else (low, high)
+
+    def within_range(self, value: float, low: float, high: float) -> tuple[float, float]:
+        """Clip the interval of a value to its physical range, such as 0 to 1 for a share.
+
+        The true value lies in this range, so the part outside never contains it: clipping leaves
+        the coverage unchanged.
+        """
+        if self.group not in BOUNDED:
+            return low, high
+        most = 1.0 if (self.unit, self.display) == ("1", "%") and value <= 1.0 else math.inf
+        return max(0.0, low), min(most, high)
 
     def text_in(self, values: Table) -> str:
         """Format its number in a row with its unit: "61.3 (44 to 78) %"."""

@@ -2,11 +2,13 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 
 from asperity.case import Case, MachineCase
 from asperity.core.arrays import usual_float_errors
 from asperity.core.errors import BadInput
+from asperity.core.notebook import notebook_progress
 from asperity.monitoring.files import RecordingPlace, RecordingTable, read_table, recordings_in
 from asperity.monitoring.forecast import Forecaster
 from asperity.monitoring.judgement import judge
@@ -62,6 +64,7 @@ def track_recordings(
     files = recordings_in(paths)
     parsed = table if isinstance(table, RecordingTable) or table is None else read_table(table)
     x_name, places = _stated_places(files, x, parsed)
+    progress = progress or _notebook_progress(len(files))
     readings = require_readable(_read_files(files, settings, target, places, progress))
     track = judge(readings, target, settings, places=places, x_name=x_name)
     track = replace(track, notes=(*track.notes, *_several_folders(files)))
@@ -71,6 +74,15 @@ def track_recordings(
         return track
     rows = unacknowledged([recording.row() for recording in track.recordings], settings.acknowledge)
     return track.with_forecast(forecaster(rows, track.x_name, comparable=track.comparable))
+
+
+def _notebook_progress(files: int) -> Callable[[Reading], None] | None:
+    """Return a callback that counts the readings; None outside of notebooks."""
+    numbers = count(1)
+    return notebook_progress(
+        "Reading",
+        lambda _: (min((number := next(numbers)) / files, 1.0), f"{number} of {files} recordings"),
+    )
 
 
 def _several_folders(files: Sequence[Path]) -> list[str]:

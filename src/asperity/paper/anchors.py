@@ -86,9 +86,12 @@ class Anchor:
         if self.since is None:
             return value
         reference = curve.interpolate(self.since, self.quantity)
-        deviation = float(np.hypot(value[2] - value[0], reference[2] - reference[0]))
+        # method of variance estimates recovery (Zou and Donner 2008): each end of the difference
+        # from the two ends that lead to it, which may lie at different distances
         change = value[0] - reference[0]
-        return change, change - deviation, change + deviation
+        below = float(np.hypot(value[0] - value[1], reference[2] - reference[0]))
+        above = float(np.hypot(value[2] - value[0], reference[0] - reference[1]))
+        return change, change - below, change + above
 
     def miss(self, our_value: float) -> float:
         """Return the deviation in the quantity's unit; 0 for a bound that is satisfied."""

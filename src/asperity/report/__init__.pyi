@@ -1,6 +1,12 @@
+from .base import Exhibit as Exhibit
+from .base import Picture as Picture
+from .base import write_exhibits as write_exhibits
 from .benchmark import benchmark_figure as benchmark_figure
+from .inference.page import inference_exhibits as inference_exhibits
 from .inference.page import write_inference_report as write_inference_report
+from .machine.page import machine_exhibits as machine_exhibits
 from .machine.page import write_machine_report as write_machine_report
+from .machine.sketch import machine_drawing as machine_drawing
 from .motion.page import write_motion_report as write_motion_report
 from .plots import draw_result as draw_result
 from .run.curves import friction_figure as friction_figure
@@ -15,5 +21,6 @@ from .study.sensitivity import calibration_figure as calibration_figure
 from .study.sensitivity import sensitivity_figure as sensitivity_figure
 from .style import Medium as Medium
 from .style import write_figure as write_figure
+from .track.page import track_exhibits as track_exhibits
 from .track.page import write_track_report as write_track_report
 from .wear.page import write_wear_report as write_wear_report

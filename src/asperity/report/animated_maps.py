@@ -15,7 +15,7 @@ import matplotlib
 import numpy as np
 import numpy.typing as npt
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize, to_rgb
+from matplotlib.colors import Colormap, Normalize, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from PIL import Image
@@ -26,7 +26,14 @@ from asperity.ehl import hertz_zone
 from asperity.report.base import Exhibit, Picture
 from asperity.report.drawing import display, name_axes
 from asperity.report.maps import colour_bar, map_figure
-from asperity.report.style import CAVITY_COLOUR, CONTACT_COLOUR, FILM_COLOURS, OIL_COLOUR, Medium
+from asperity.report.style import (
+    CAVITY_COLOUR,
+    CONTACT_COLOUR,
+    FILM_COLOURS,
+    OIL_COLOUR,
+    STRESS_COLOURS,
+    Medium,
+)
 
 SCRIPT = resources.files("asperity.report").joinpath("moving.js").read_text("utf-8")
 SHADES = 56  # colours of a map: few enough for small files, enough to look continuous
@@ -41,7 +48,7 @@ TEXTS: Mapping[Kind, tuple[str, str]] = {  # title and caption
     "pressure": ("Pressure", "Total pressure of oil and asperities."),
     "contact": ("Asperity contact", "Contact state: asperity contact, oil film, cavitated film."),
 }
-COLOURS = {"gap": FILM_COLOURS, "pressure": "inferno"}
+COLOURS: dict[str, str | Colormap] = {"gap": FILM_COLOURS, "pressure": STRESS_COLOURS}
 CLASSES = {"oil film": OIL_COLOUR, "cavitated": CAVITY_COLOUR, "asperity contact": CONTACT_COLOUR}
 
 
@@ -173,6 +180,6 @@ def _quantise(values: Field, top: float) -> npt.NDArray[np.uint8]:
 
 def _palette() -> bytes:
     shades = np.linspace(0.0, 1.0, SHADES)
-    colours = [matplotlib.colormaps[name](shades)[:, :3] for name in COLOURS.values()]
+    colours = [matplotlib.colormaps.get_cmap(name)(shades)[:, :3] for name in COLOURS.values()]
     colours.append(np.array([to_rgb(colour) for colour in CLASSES.values()]))
     return np.rint(255.0 * np.concatenate(colours)).astype(np.uint8).tobytes()

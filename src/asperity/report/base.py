@@ -17,10 +17,21 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 from matplotlib.figure import Figure
 
-from asperity.core.files import atomic_write, require_writable
+from asperity.core.files import atomic_write, make_folder, require_writable
 from asperity.core.quantities import UNKNOWN, Quantity, in_print, quantity
 from asperity.paper import CITATION
-from asperity.report.style import ON_PAGE, ON_PAPER, ON_PHONE, Medium, svg, write_figure
+from asperity.report.style import (
+    ACROSS_PAGE,
+    COLUMN_MM,
+    IN_COLUMN,
+    ON_PAGE,
+    ON_PHONE,
+    PAGE_MM,
+    Medium,
+    for_paper,
+    svg,
+    write_figure,
+)
 
 POLICY = (
     "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; "
@@ -56,6 +67,11 @@ class Exhibit:
         with medium.drawing():
             return self.draw(medium)
 
+    def paper_figure(self, medium: Medium) -> Figure:
+        """Draw the figure for a paper, without title."""
+        with medium.drawing():
+            return for_paper(self.draw(medium))
+
     def picture(self) -> Picture:
         """Draw the figure and embed it."""
         return self.embed(self.figure())
@@ -83,15 +99,22 @@ class Exhibit:
 
 
 def write_exhibits(
-    exhibits: Iterable[Exhibit], folder: Path, progress: Callable[[str], None]
+    exhibits: Iterable[Exhibit], folder: str | Path, progress: Callable[[str], None] | None = None
 ) -> None:
-    """Write each exhibit as PDF and PNG for a paper, and all captions to captions.md."""
+    """Write each exhibit as PDF for one column and for the page, and all captions to captions.md.
+
+    The pictures are 85 and 175 mm wide, as their names say, and have no title.
+    """
+    folder = Path(folder)
+    make_folder(folder)
+    require_writable(folder / "captions.md")
     captions = []
     for exhibit in exhibits:
-        progress(f"drawing {exhibit.name}")
-        figure = exhibit.figure(ON_PAPER)
-        for suffix in (".pdf", ".png"):
-            write_figure(figure, folder / f"{exhibit.name}{suffix}", medium=ON_PAPER, dpi=300)
+        if progress is not None:
+            progress(f"drawing {exhibit.name}")
+        for medium, width in ((IN_COLUMN, COLUMN_MM), (ACROSS_PAGE, PAGE_MM)):
+            path = folder / f"{exhibit.name}-{width:.0f}mm.pdf"
+            write_figure(exhibit.paper_figure(medium), path, medium=medium, dpi=300)
         captions.append(f"**{exhibit.name}**: {exhibit.caption}\n\n")
     with atomic_write(folder / "captions.md") as part:
         part.write_text(

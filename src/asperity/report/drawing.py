@@ -15,6 +15,7 @@ from asperity.report.style import SPLIT_COLOUR, SPLIT_STRIP, Medium
 from asperity.trend import Stages
 
 PANELS_PER_ROW = 4
+NARROW = 5.0  # inches, up to which only two panels with titles fit side by side
 Value = TypeVar("Value", float, Field)
 
 
@@ -50,9 +51,16 @@ def one_panel(
     return decorate
 
 
-def panels_in_rows(figure: Figure, count: int, **sharing: Any) -> list[Axes]:
-    """Add `count` equal panels, `PANELS_PER_ROW` in a row."""
-    columns = min(PANELS_PER_ROW, count)
+def panels_per_row(medium: Medium, count: int) -> int:
+    """Return how many of `count` maps or curves with titles stand side by side."""
+    return min(PANELS_PER_ROW if medium.double > NARROW else 2, count)
+
+
+def panels_in_rows(
+    figure: Figure, count: int, columns: int = PANELS_PER_ROW, **sharing: Any
+) -> list[Axes]:
+    """Add `count` equal panels in rows of `columns`."""
+    columns = min(columns, count)
     panels = list(figure.subplots(-(-count // columns), columns, squeeze=False, **sharing).flat)
     for unused in panels[count:]:
         unused.remove()

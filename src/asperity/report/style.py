@@ -13,7 +13,9 @@ from textwrap import wrap
 from typing import Any, TypeAlias
 
 import matplotlib
+import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
@@ -24,15 +26,19 @@ from asperity.core.files import atomic_write
 # Colours of Okabe and Ito, distinguishable with any colour vision; lines also differ by style or
 # marker.
 BLUE, VERMILION, GREEN, GREY = "#0072b2", "#d55e00", "#009e73", "#6b7280"
-FILM_COLOURS = "viridis"  # Matplotlib's name; `app.figures` has its own copy of the map
-# The paper's Fig 6 has oil in red and asperities in yellow. These differ in lightness too, for grey
-# printers.
+# One colour, one meaning: red is an alarm and yellow is asperity contact, so no film is drawn in
+# either. The colours of the contact state differ in lightness too, for grey printers.
 CONTACT_COLOUR, OIL_COLOUR, CAVITY_COLOUR, CAVITY_STRIPE = (
     "#f7dc4a",
-    "#c8452f",
+    "#4a8db7",
     "#33415c",
     "#8b9cb8",
 )
+# maps of even lightness steps; `app.figures` has its own copy of that of the film
+FILM_COLOURS = ListedColormap(
+    matplotlib.colormaps["viridis"](np.linspace(0.0, 207.0 / 255.0, 256)), name="film"
+)
+STRESS_COLOURS, HEAT_COLOURS, HEIGHT_COLOURS = "magma", "inferno", "cividis"
 GAP_COLOUR = "#e5e7eb"  # open gap of a dry contact
 SPLIT_COLOUR, SPLIT_STRIP, BAND_COLOUR = "#8a5a00", "#f2e3c6", "#e8eef4"
 Style: TypeAlias = dict[str, Any]  # keyword arguments of matplotlib
@@ -98,25 +104,50 @@ class Medium:
 
 ON_PAGE = Medium(4.8, 9.6, titled=True)  # two fit side by side; one alone is readable on a phone
 ON_PHONE = Medium(4.8, 4.8, titled=True)
-ON_PAPER = Medium(
-    84.0 / 25.4,
-    174.0 / 25.4,
-    titled=False,
-    style={
-        "font.size": 8.0,
-        "axes.titlesize": 8.0,
-        "xtick.labelsize": 7.5,
-        "ytick.labelsize": 7.5,
-        "legend.fontsize": 7.5,
-        "legend.handlelength": 1.7,
-        "legend.columnspacing": 1.2,
-        "axes.linewidth": 0.6,
-        "xtick.major.width": 0.6,
-        "ytick.major.width": 0.6,
-        "lines.linewidth": 1.1,
-        "hatch.linewidth": 0.4,
-    },
+_PRINT: Style = {
+    "font.size": 8.0,
+    "axes.titlesize": 8.0,
+    "xtick.labelsize": 7.5,
+    "ytick.labelsize": 7.5,
+    "legend.fontsize": 7.5,
+    "legend.handlelength": 1.7,
+    "legend.columnspacing": 1.2,
+    "axes.linewidth": 0.6,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "lines.linewidth": 1.1,
+    "hatch.linewidth": 0.4,
+}
+COLUMN_MM, PAGE_MM = 85.0, 175.0  # widths of a journal's column and of its page
+ON_PAPER = Medium(COLUMN_MM / 25.4, PAGE_MM / 25.4, titled=False, style=_PRINT)
+IN_COLUMN, ACROSS_PAGE = (
+    Medium(width / 25.4, width / 25.4, titled=False, style=_PRINT) for width in (COLUMN_MM, PAGE_MM)
 )
+
+
+def for_paper(figure: Figure) -> Figure:
+    """Remove the title of a figure and of its only panel, and fit legends into its width.
+
+    Letters and titles of several panels remain, because they name what each shows.
+    """
+    figure.suptitle("")
+    titled = [axes for axes in figure.axes if _titles(axes)]
+    if len(titled) == 1:
+        for title in _titles(titled[0]):
+            title.set_text("")
+    if figure.legends:
+        figure.draw_without_rendering()
+    for first in list(figure.legends):
+        legend = first
+        columns = legend._ncols  # type: ignore[attr-defined]
+        names = [text.get_text() for text in legend.get_texts()]
+        while columns > 1 and legend.get_window_extent().width > figure.bbox.width:
+            columns -= 1
+            handles = [*filter(None, legend.legend_handles)]
+            legend.remove()
+            legend = figure.legend(handles, names, loc="outside lower center", ncols=columns)
+            figure.draw_without_rendering()
+    return figure
 
 
 def fit_titles(figure: Figure) -> None:

@@ -12,9 +12,7 @@ from .fields import write_fields as write_fields
 from .friction_interval import FrictionInterval as FrictionInterval
 from .roughness_levels import levels_verdict as levels_verdict
 from .roughness_levels import not_converged as not_converged
-from .run import BOUNDARY_FROM as BOUNDARY_FROM
 from .run import ENDS as ENDS
-from .run import FULL_FILM_BELOW as FULL_FILM_BELOW
 from .run import RUN_GROUPS as RUN_GROUPS
 from .run import SHORT_GROUPS as SHORT_GROUPS
 from .run import UNCERTAINTY as UNCERTAINTY
@@ -28,7 +26,10 @@ from .surface_spread import Scalar as Scalar
 from .surface_spread import mean_row as mean_row
 from .surface_spread import prediction_interval as prediction_interval
 from .surface_spread import total_error as total_error
+from .uncertainty_text import BOUNDARY_FROM as BOUNDARY_FROM
+from .uncertainty_text import FULL_FILM_BELOW as FULL_FILM_BELOW
 from .uncertainty_text import UNDETERMINED as UNDETERMINED
+from .uncertainty_text import lubrication as lubrication
 from .uncertainty_text import uncertainty_rows as uncertainty_rows
 from .vibration import VibratedCase as VibratedCase
 from .vibration import vibrate_case as vibrate_case

@@ -27,7 +27,7 @@ from asperity.results.friction_interval import (
 from asperity.results.run_contents import run_contents
 from asperity.results.running import Running
 from asperity.results.surface_spread import AVERAGED, Row, Scalar, half_interval, mean_row
-from asperity.results.uncertainty_text import basis, ends_text, interval_text
+from asperity.results.uncertainty_text import basis, ends_text, interval_text, lubrication
 from asperity.solution import (
     FILMS,
     HOT,
@@ -57,9 +57,6 @@ PURE_ROLLING = (
     "In pure rolling friction is zero; what resists is rolling friction "
     "(rolling_friction_coefficient)."
 )
-FULL_FILM_BELOW = 0.01  # share of the load on asperities
-BOUNDARY_FROM = 0.9
-
 RUN_GROUPS = (*AVERAGED, "solver")
 SHORT_GROUPS = tuple(group for group in RUN_GROUPS if group != "virgin")  # of short tables
 UNCERTAINTY = "uncertainty"  # group of the catalogue: intervals over all surfaces
@@ -395,16 +392,16 @@ class Run(Displayed):
         contact = f"{ends}{self.resonance_text()}"
         return f"{sentence}; {doubt}{contact}; {basis(self.error, snapshot=self.is_snapshot)}."
 
+    @property
+    def lubrication(self) -> str:
+        """Full film, mixed or boundary lubrication, or dry contact."""
+        return self._regime_and_shares()[0]
+
     def _regime_and_shares(self) -> tuple[str, str]:
         """Return the lubrication regime, and the shares of load and area as text."""
         numbers = mean_row((self.summary_row, *self.others))
         clr, car = (float(numbers[key]) for key in ("clr", "car"))
-        if self.solution.lubricant is None:
-            regime = "Dry contact"
-        elif clr < FULL_FILM_BELOW:
-            regime = "Full film"
-        else:
-            regime = "Boundary lubrication" if clr >= BOUNDARY_FROM else "Mixed lubrication"
+        regime = lubrication(clr, lubricated=self.solution.lubricant is not None)
         load, area = (quantity(key).text(value) for key, value in (("clr", clr), ("car", car)))
         roughness = ", ".join(quantity(k).named(numbers[k]) for k in ROUGHNESS_KEYS if numbers[k])
         bearing = "asperities carry" if self.state.sq > 0.0 else "solid contact carries"

@@ -14,6 +14,7 @@ from asperity import ehl
 from asperity.case import Case, load_case
 from asperity.core.arrays import usual_float_errors
 from asperity.core.errors import AsperityError, BadInput, NotConverged, UnreadableFile
+from asperity.core.notebook import count_progress
 from asperity.core.processes import cores, set_up_worker
 from asperity.core.storage import version_notes
 from asperity.coupling import Vibration, contact_vibration, require_sampling
@@ -78,6 +79,9 @@ def solve_case(
             )
         case = replace(case, stored=surface)
         surfaces = 1
+    if surface_progress is None:
+        items = "time steps" if case.is_running else "surfaces"
+        surface_progress = count_progress("Solving", items)
     if case.is_running:
         steps = TrackProgress(progress, surface_progress)
         return _running(case, surfaces, workers, steps, strict, groups)

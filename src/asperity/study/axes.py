@@ -12,7 +12,7 @@ import pandas
 from asperity.case import split_amount
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
-from asperity.study.curve import student_half_width
+from asperity.study.curve import interval_in_range, student_half_width
 from asperity.study.plan import StudyPlan, as_written
 from asperity.study.ranges import stated_value
 
@@ -87,8 +87,13 @@ def varying_outputs(table: pandas.DataFrame) -> list[str]:
     return [key for key in present if _varies(table[key].to_numpy(dtype=float))]
 
 
-def group_means(x: Field, values: Field, *, binned: bool) -> tuple[Field, Field, Field, Field]:
-    """Return x, mean and Student's interval (low, high) over cases of equal or neighbouring x."""
+def group_means(
+    key: str, x: Field, values: Field, *, binned: bool
+) -> tuple[Field, Field, Field, Field]:
+    """Return x, mean and Student's interval (low, high) over cases of equal or neighbouring x.
+
+    `values` are of the quantity `key`, in SI; the interval is clipped to its physical range.
+    """
     group = np.unique(x, return_inverse=True)[1]
     if binned:
         group = np.searchsorted(
@@ -99,9 +104,10 @@ def group_means(x: Field, values: Field, *, binned: bool) -> tuple[Field, Field,
         members = values[group == number]
         mean = members.mean()
         half = student_half_width(members.std(ddof=1), members.size) if members.size > 1 else np.nan
-        rows.append((x[group == number].mean(), mean, mean - half, mean + half))
-    centres, means, low, high = np.array(rows, dtype=float).reshape(-1, 4).T
-    return centres, means, low, high
+        low, high = interval_in_range(key, np.array([mean]), np.array([half]))[0]
+        rows.append((x[group == number].mean(), mean, low, high))
+    centres, means, lower, upper = np.array(rows, dtype=float).reshape(-1, 4).T
+    return centres, means, lower, upper
 
 
 def pair_means(values: Field, across: SweptAxis, up: SweptAxis) -> Field:

@@ -15,6 +15,7 @@ from asperity.core.arrays import Field, usual_float_errors
 from asperity.core.coverage import COVERAGE
 from asperity.core.displayed import Brief
 from asperity.core.errors import BadInput, require_positive
+from asperity.core.quantities import catalogue
 from asperity.study.evaluate import BOTH_PRESETS, DONE
 from asperity.study.execute import StudyProgress, StudyResult, run_study
 from asperity.study.plan import plan_points
@@ -78,17 +79,18 @@ class WearCurve(Brief):
         )
 
     def interval(self, quantity: str, level: float = COVERAGE) -> Field:
-        """Return Student's interval of the mean, shape (levels, 2); nan for fewer than 2 seeds."""
-        counts = np.array([values.size for values in self._by_level(quantity)])
-        half_width = student_half_width(self.std(quantity), counts, level)
-        return self.mean(quantity)[:, None] + np.outer(half_width, (-1.0, 1.0))
+        """Return Student's interval of the mean, shape (levels, 2); nan for fewer than 2 seeds.
+
+        It is clipped to the quantity's physical range, which leaves its coverage unchanged.
+        """
+        return interval_in_range(quantity, self.mean(quantity), self._half_width(quantity, level))
 
     def interpolate(
         self, sq: float, quantity: str, level: float = COVERAGE
     ) -> tuple[float, float, float]:
         """Interpolate mean and interval linearly at a roughness [m]; nan outside the levels."""
         mean = self.mean(quantity)
-        half_width = np.diff(self.interval(quantity, level), axis=1)[:, 0] / 2.0
+        half_width = self._half_width(quantity, level)
         if not self.sq[0] * (1 - 1e-9) <= sq <= self.sq[-1] * (1 + 1e-9):
             return np.nan, np.nan, np.nan
         weights = np.ones(1)
@@ -103,7 +105,7 @@ class WearCurve(Brief):
         middle = float(weights[used] @ mean[used])
         # the surfaces of neighbouring levels are independent
         error = float(np.sqrt(np.sum((weights[used] * half_width[used]) ** 2)))
-        return middle, middle - error, middle + error
+        return middle, *_single_interval(quantity, middle, error)
 
     @cached_property
     def stages(self) -> dict[str, Stages]:
@@ -161,6 +163,11 @@ class WearCurve(Brief):
             else sentence
         )
 
+    def _half_width(self, quantity: str, level: float) -> Field:
+        """Return half the width of Student's interval of the mean, shape (levels,)."""
+        counts = np.array([values.size for values in self._by_level(quantity)])
+        return student_half_width(self.std(quantity), counts, level)
+
     def _by_level(self, quantity: str) -> list[Field]:
         return [self.values(quantity, level) for level in range(self.sq.size)]
 
@@ -169,6 +176,23 @@ def student_half_width(std: ArrayLike, counts: ArrayLike, level: float = COVERAG
     """Return half the width of Student's interval of a mean over `counts` values."""
     quantile = scipy.special.stdtrit(np.maximum(np.asarray(counts) - 1, 1), 0.5 + level / 2.0)
     return np.asarray(quantile * std / np.sqrt(np.maximum(counts, 1)))
+
+
+def interval_in_range(key: str, means: Field, half_widths: Field) -> Field:
+    """Return means ± half-widths within the physical range of a quantity, shape (means, 2)."""
+    ends = means[:, None] + np.outer(half_widths, (-1.0, 1.0))
+    entry = catalogue().get(key)
+    if entry is None:  # by preset or of another table: not a share
+        return np.asarray(ends)
+    for row, mean in zip(ends, means, strict=True):
+        if np.isfinite(row).all():
+            row[:] = entry.within_range(float(mean), *map(float, row))
+    return np.asarray(ends)
+
+
+def _single_interval(key: str, mean: float, half_width: float) -> tuple[float, float]:
+    low, high = interval_in_range(key, np.array([mean]), np.array([half_width]))[0]
+    return float(low), float(high)
 
 
 @usual_float_errors

@@ -30,6 +30,7 @@ from asperity.core.arrays import Field, usual_float_errors
 from asperity.core.displayed import Displayed
 from asperity.core.errors import AsperityError, BadInput, require_positive
 from asperity.core.files import versions
+from asperity.core.notebook import notebook_progress
 from asperity.core.processes import cores, set_up_worker
 from asperity.study.evaluate import DONE, FAILED, FIELDS, Row, TimedBatch, timed_batch
 from asperity.study.maps import require_zarr
@@ -164,6 +165,7 @@ def run_study(
     if fields:
         require_zarr()
     start = time.perf_counter()
+    progress = progress or notebook_progress("Study", _progress_text)
     with nullcontext() if out is None else open_study_folder(Path(out), plan, shard) as store:
         work = _Work(plan, store, shard, retry_failed, tuple(fields), start, progress)
         if work.waiting:
@@ -174,6 +176,11 @@ def run_study(
             return StudyResult(plan, table, seconds=seconds, computed=work.done)
         path = store.merge()
         return StudyResult(plan, store.table(), store.folder, path, seconds, work.done)
+
+
+def _progress_text(state: StudyProgress) -> tuple[float, str]:
+    done = state.kept + state.done
+    return done / max(state.total, 1), f"{done} of {state.total} cases, {state.failed} failed"
 
 
 def merge_studies(

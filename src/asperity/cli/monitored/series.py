@@ -38,6 +38,7 @@ WITHOUT_RECORDINGS: dict[str, tuple[str, object]] = {
     "--emulator": ("emulator", None),
     "--store": ("store", None),
     "--workers": ("workers", None),
+    "--figures": ("figures", None),
 }
 ONLY_OF_WATCH: dict[str, tuple[str, object]] = {
     "--machine": ("machine", None),
@@ -72,7 +73,7 @@ def track_series(options: SimpleNamespace) -> None:
         judged.verdict(),
         lambda: judged.scalars() | {"written": [str(path) for path in saved]},
         _overall_rows(judged),
-        written("  Written", *saved) if saved else ["  Add --out judged.csv for all rows."],
+        written("Written", *saved) if saved else ["Add --out judged.csv for all rows."],
         as_json=options.as_json,
         quiet=options.quiet,
     )

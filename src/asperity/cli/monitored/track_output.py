@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from asperity.cli.output import Block, Row, columns, show, span, table, written
+from asperity.cli.terminal.browser import open_page
 from asperity.core.quantities import NO_VALUE, quantity
 
 if TYPE_CHECKING:
@@ -16,12 +17,13 @@ def show_track(
     saved: list[Path],
     store: Path | None,
     *,
+    opened: bool,
     as_json: bool,
     quiet: bool,
 ) -> None:
     """Show the verdict of a track, its series and what was written."""
     paths_written = saved if store is None else [*saved, store]
-    hint = ["  Add --report track.html for the page, --out track.csv for the table."]
+    hint = ["Add --report track.html for the page, --out track.csv for the table."]
     show(
         tracked.verdict(),
         lambda: (
@@ -33,10 +35,11 @@ def show_track(
         ),
         _series(tracked),
         _searched(tracked),
-        written("  Written", *paths_written) if paths_written else hint,
+        written("Written", *paths_written) if paths_written else hint,
         as_json=as_json,
         quiet=quiet,
     )
+    open_page(page, requested=opened)
 
 
 def _series(tracked: "Track") -> Block:

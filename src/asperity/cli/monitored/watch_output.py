@@ -28,10 +28,17 @@ END_S = 20.0  # time for reports at the end of a watch [s]
 REPORT_RETRY_S = 5.0  # first delay before a failed report is written again [s]
 
 
-def write_track(tracked: "Track", out: Sequence[Path], page: Path | None) -> list[Path]:
-    """Write tables and page of a track; return their paths."""
+def write_track(
+    tracked: "Track", out: Sequence[Path], page: Path | None, figures: Path | None = None
+) -> list[Path]:
+    """Write tables, page and figures of a track; return their paths."""
     saved = [tracked.save(path) for path in out]
-    return saved if page is None else [*saved, report.write_track_report(tracked, page)]
+    if page is not None:
+        saved.append(report.write_track_report(tracked, page))
+    if figures is not None:
+        report.write_exhibits(report.track_exhibits(tracked), figures)
+        saved.append(figures)
+    return saved
 
 
 class WatchReports:

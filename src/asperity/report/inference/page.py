@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from asperity.core.quantities import quantity
 from asperity.inference import KEY_QUANTITIES, Design, Forecast, Inference, PointEstimates
-from asperity.report.base import Tile, heading, render, write_page
+from asperity.report.base import Exhibit, Tile, heading, render, write_page
 from asperity.report.forecast import forecast_exhibit
 from asperity.report.inference import exhibits
 
@@ -63,6 +63,7 @@ def render_inference_page(
             if key in posterior
         ],
         warnings=inference.warnings(),
+        meanings=[_meaning(inference, key) for key in posterior],
         marginals=exhibits.marginals(inference).picture(),
         pairs=exhibits.pairs(inference).picture(),
         predicted=exhibits.predicted(inference).picture() if inference.observations else None,
@@ -72,9 +73,7 @@ def render_inference_page(
         points=[point.cells() for point in inference.point_estimates()],
         forecast=forecast,
         design=design,
-        forecast_picture=None
-        if forecast is None
-        else forecast_exhibit(forecast.bands, forecast.x_name or "x").picture(),
+        forecast_picture=None if forecast is None else _forecast_exhibit(forecast).picture(),
         design_picture=None if design is None else exhibits.design_changes(design).picture(),
         models=[
             (
@@ -87,6 +86,39 @@ def render_inference_page(
         ],
         emulator=inference.emulator.sentence(),
         case_text=inference.setting.case.text,
+    )
+
+
+def inference_exhibits(
+    inference: Inference, forecast: Forecast | None = None, design: Design | None = None
+) -> list[Exhibit]:
+    """Return the figures of the page, distributions first."""
+    return [
+        exhibits.marginals(inference),
+        exhibits.pairs(inference),
+        *([exhibits.predicted(inference)] if inference.observations else []),
+        exhibits.next_recording(inference),
+        *([] if forecast is None else [_forecast_exhibit(forecast)]),
+        *([] if design is None else [exhibits.design_changes(design)]),
+    ]
+
+
+def _forecast_exhibit(forecast: Forecast) -> Exhibit:
+    return forecast_exhibit(forecast.bands, forecast.x_name or "x")
+
+
+def _meaning(inference: Inference, key: str) -> str:
+    """Explain the posterior of a quantity in one sentence."""
+    estimate = inference.posterior()[key]
+    entry = quantity(key)
+    if not estimate.learnt:
+        return (
+            f"{heading(entry)}: the recordings contain no information; the interval "
+            f"{entry.interval(estimate.low, estimate.high)} is that assumed before."
+        )
+    return (
+        f"{heading(entry)}: with 90 % probability {entry.interval(estimate.low, estimate.high)}, "
+        f"equally likely above and below {entry.text(estimate.median)}."
     )
 
 

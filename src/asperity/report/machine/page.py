@@ -55,6 +55,12 @@ def write_machine_report(
     return write_page(path, lambda: _page(result, opened))
 
 
+def machine_exhibits(result: MachineResult) -> list[Exhibit]:
+    """Return the figures of the page: drawing, path of contact and worst contact."""
+    path = [along_path(result)] if len(result.rows) > 1 else []
+    return [machine_sketch(result), *path, *_worst(result)]
+
+
 def _page(result: MachineResult, opened: str | None) -> str:
     keys = [
         (key, quantity(name)) for key, name in (*CONDITIONS, *SOLVED) if _has_values(result, key)

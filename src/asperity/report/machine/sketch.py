@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
+from asperity.case import MachineCase
 from asperity.core.arrays import Field
 from asperity.core.quantities import quantity
 from asperity.machine import (
@@ -21,7 +22,7 @@ from asperity.machine import (
     SpurGear,
     TwinDisc,
 )
-from asperity.machines import MachineResult
+from asperity.machines import MachineResult, machine_conditions
 from asperity.report.base import Exhibit
 from asperity.report.style import BLUE, GREY, VERMILION, Medium, Style
 
@@ -69,6 +70,12 @@ def machine_sketch(result: MachineResult) -> Exhibit:
         return figure
 
     return Exhibit("machine", drawn, caption, f"{machine.title()}, drawn to scale. {caption}")
+
+
+def machine_drawing(case: MachineCase) -> tuple[str, str, str]:
+    """Draw a machine without solving it; return data URI, alternative text and caption."""
+    picture = machine_sketch(machine_conditions(case)).picture()
+    return picture.uri, picture.alt, picture.caption
 
 
 def _circle(axes: Axes, x: float, y: float, radius: float, **style: Any) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 from asperity.core.errors import BadInput
 from asperity.core.quantities import in_print, quantity
 from asperity.report import animated_maps
-from asperity.report.base import render, tile, write_page
+from asperity.report.base import Exhibit, render, tile, write_exhibits, write_page
 from asperity.report.motion import exhibits
 from asperity.report.oil_balance import DRY, oil_limit
 from asperity.simulation import History, HistoryVibration
@@ -30,7 +30,11 @@ TILES = ("clr", "car", "h_mean_m", "friction_coefficient", "resonance_hz")
 
 
 def write_motion_report(
-    history: History, path: str | Path, *, vibration: HistoryVibration | None = None
+    history: History,
+    path: str | Path,
+    *,
+    vibration: HistoryVibration | None = None,
+    figures: str | Path | None = None,
 ) -> Path:
     """Write a self-contained HTML report of a history, atomically.
 
@@ -39,6 +43,7 @@ def write_motion_report(
     history : with at least one stored map
     path : file to write; its folder must exist
     vibration : response of a mass on the contact, if computed
+    figures : folder for each figure as PDF (85 and 175 mm wide) and `captions.md`
 
     Raises
     ------
@@ -49,7 +54,20 @@ def write_motion_report(
         raise BadInput(
             "a report needs at least one stored map, got none; run the case into a new folder"
         )
-    return write_page(path, lambda: render_motion_page(history, vibration))
+    page = write_page(path, lambda: render_motion_page(history, vibration))
+    if figures is not None:
+        write_exhibits(history_exhibits(history), figures)
+    return page
+
+
+def history_exhibits(history: History) -> list[Exhibit]:
+    """Return the exhibits of a report: curves over time and, with flattening, over passes."""
+    over_time = [exhibits.curves(history)]
+    return [*over_time, exhibits.running_in(history)] if _has_passes(history) else over_time
+
+
+def _has_passes(history: History) -> bool:
+    return history.case.motion.flattening and len(history.by_pass()) >= 2
 
 
 def render_motion_page(history: History, vibration: HistoryVibration | None = None) -> str:
@@ -61,7 +79,6 @@ def render_motion_page(history: History, vibration: HistoryVibration | None = No
     motion = history.case.motion
     rows = history.settled
     values = history.scalars()
-    pass_by_pass = motion.flattening and len(history.by_pass()) >= 2
     return render(
         "motion/page.html.j2",
         title="A contact in motion",
@@ -74,7 +91,7 @@ def render_motion_page(history: History, vibration: HistoryVibration | None = No
         ],
         maps=animated_maps.animated_maps(history.case, scale),
         curves=over_time.embed(figure),
-        running_in=exhibits.running_in(history).picture() if pass_by_pass else None,
+        running_in=exhibits.running_in(history).picture() if _has_passes(history) else None,
         motion=motion,
         numbers=[quantity(key) for key in NUMBERS],
         values=values,

@@ -26,6 +26,8 @@ from asperity.report.style import (
     FILM_COLOURS,
     GREEN,
     GREY,
+    HEIGHT_COLOURS,
+    STRESS_COLOURS,
     VERMILION,
     Medium,
     Style,
@@ -117,7 +119,7 @@ def pressure_map(run: Solved) -> Exhibit:
     title = f"Pressure, maximum {largest}"
     return Exhibit(
         "pressure",
-        map_drawer(solution, "pressure", solution.pressure, title, cmap="inferno", vmin=0.0),
+        map_drawer(solution, "pressure", solution.pressure, title, cmap=STRESS_COLOURS, vmin=0.0),
         f"Total pressure of oil and asperities.{capped}",
         f"Map of the pressure: at most {largest}; Hertz (smooth, dry): "
         f"{pressure.text(solution.conditions.hertz.p_max)}.",
@@ -193,7 +195,7 @@ def roughness_map(run: Run) -> Exhibit:
     heights = solution.surface.heights
     title = f"Composite roughness, {sq.named(solution.surface.sq)}"
     limit = display("surface_height", float(np.percentile(np.abs(heights), 99.5))) or 1.0
-    colours: Style = {"extend": "both", "cmap": "cividis", "vmin": -limit, "vmax": limit}
+    colours: Style = {"extend": "both", "cmap": HEIGHT_COLOURS, "vmin": -limit, "vmax": limit}
     return Exhibit(
         "roughness",
         map_drawer(solution, "surface_height", heights, title, **colours),

@@ -12,7 +12,16 @@ from asperity.core.quantities import quantity
 from asperity.report.base import Exhibit
 from asperity.report.drawing import display, name_axes, one_panel
 from asperity.report.maps import colour_bar, map_drawer, map_figure
-from asperity.report.style import BLUE, DASHED, GREEN, VERMILION, Medium, Style
+from asperity.report.style import (
+    BLUE,
+    DASHED,
+    GREEN,
+    HEAT_COLOURS,
+    STRESS_COLOURS,
+    VERMILION,
+    Medium,
+    Style,
+)
 from asperity.results import FrictionInterval, Run
 from asperity.solution import FlashTemperature, Friction, hertz_stress
 
@@ -31,7 +40,9 @@ def traction_map(run: Run, friction: Friction) -> Exhibit:
     speed = quantity("sliding_speed_m_s").text(run.solution.conditions.sliding_speed)
     return Exhibit(
         "traction",
-        map_drawer(run.solution, "shear", values, title, ticks=ticks, cmap="magma", norm=norm),
+        map_drawer(
+            run.solution, "shear", values, title, ticks=ticks, cmap=STRESS_COLOURS, norm=norm
+        ),
         f"Shear stress on both surfaces at sliding speed {speed}. In asperity contact: "
         f"{friction.boundary_friction:g} times the pressure (friction part "
         f"{quantity('friction_asperity_part').text(friction.asperity_part)}); elsewhere: shear of "
@@ -50,7 +61,7 @@ def temperature_map(run: Run, friction: Friction, heat: FlashTemperature) -> Exh
     )
     return Exhibit(
         "temperature",
-        map_drawer(run.solution, "surface_temperature", hotter, title, cmap="inferno"),
+        map_drawer(run.solution, "surface_temperature", hotter, title, cmap=HEAT_COLOURS),
         f"Temperature of the hotter surface. Friction power {total}: {first} flow into body 1, "
         f"{second} into body 2.",
         f"Map of the flash temperature: maximum {largest} above the bulk of the body.",
@@ -100,7 +111,12 @@ def stress_map(run: Run) -> Exhibit:
     return Exhibit(
         "stress",
         map_drawer(
-            run.solution, "von_mises_stress_pa", run.stress.largest, title, cmap="viridis", vmin=0.0
+            run.solution,
+            "von_mises_stress_pa",
+            run.stress.largest,
+            title,
+            cmap=STRESS_COLOURS,
+            vmin=0.0,
         ),
         "Maximum von Mises stress below each cell, over sixteen depths in body 1: an elastic, "
         "smooth "
@@ -120,7 +136,7 @@ def stress_section(run: Run) -> Exhibit:
         image = axes.imshow(
             display("von_mises_stress_pa", values.T),
             extent=(x(left), x(right), x(bottom), x(top)),
-            cmap="viridis",
+            cmap=STRESS_COLOURS,
             vmin=0.0,
             interpolation="none",
             aspect="equal",

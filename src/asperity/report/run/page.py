@@ -1,6 +1,7 @@
 """HTML report of solved runs: results, conditions, uncertainties and limits of the model."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -8,7 +9,16 @@ from asperity.core.errors import BadInput
 from asperity.core.quantities import quantity, select
 from asperity.ehl import Convergence
 from asperity.lubricant import Newtonian
-from asperity.report.base import Exhibit, Picture, Tile, range_text, render, tile, write_page
+from asperity.report.base import (
+    Exhibit,
+    Picture,
+    Tile,
+    range_text,
+    render,
+    tile,
+    write_exhibits,
+    write_page,
+)
 from asperity.report.oil_balance import DRY, model_name, oil_limit
 from asperity.report.run import contact, friction_maps, roller, several_runs
 from asperity.report.run.conditions import conditions_table
@@ -28,8 +38,16 @@ TILES = (
     "contact_damping_ratio",
 )
 
+SHOWN, SHOWN_OF_SEVERAL = 4, 2  # pictures of a run before the fold
 
-def write_report(runs: Sequence[Run], path: str | Path, *, title: str | None = None) -> Path:
+
+def write_report(
+    runs: Sequence[Run],
+    path: str | Path,
+    *,
+    title: str | None = None,
+    figures: str | Path | None = None,
+) -> Path:
     """Write a self-contained HTML report of one or several runs, atomically.
 
     Parameters
@@ -37,6 +55,7 @@ def write_report(runs: Sequence[Run], path: str | Path, *, title: str | None = N
     runs : at least one; several are compared and drawn over their roughness
     path : file to write; its folder must exist
     title : heading of the page (default: the contact and its roughness)
+    figures : folder for each figure as PDF (85 and 175 mm wide) and `captions.md`
 
     Returns
     -------
@@ -50,7 +69,22 @@ def write_report(runs: Sequence[Run], path: str | Path, *, title: str | None = N
     """
     if not runs:
         raise BadInput("a report needs at least one run, got none; name the run files to show")
-    return write_page(path, lambda: render_page(runs, title=title))
+    page = write_page(path, lambda: render_page(runs, title=title))
+    if figures is not None:
+        write_exhibits(report_exhibits(runs), figures)
+    return page
+
+
+def report_exhibits(runs: Sequence[Run]) -> Iterator[Exhibit]:
+    """Yield all exhibits of a report; the names of several runs start with the run's number."""
+    if len(runs) == 1:
+        yield from run_exhibits(runs[0])
+        return
+    if len({run.state.sq for run in runs}) > 1:
+        yield from _overview(runs)
+    for number, run in enumerate(runs, 1):
+        for exhibit in run_exhibits(run):
+            yield replace(exhibit, name=f"run-{number}-{exhibit.name}")
 
 
 def render_page(runs: Sequence[Run], *, title: str | None = None) -> str:
@@ -69,6 +103,7 @@ def render_page(runs: Sequence[Run], *, title: str | None = None) -> str:
         overview=[exhibit.picture() for exhibit in _overview(runs)]
         if len({run.state.sq for run in runs}) > 1
         else [],
+        headline=[quantity(key) for key in TILES],
         numbers=[entry for group in groups for entry in select(group)],
         conditions=conditions_table(runs),
         snapshot=any(run.is_snapshot for run in runs),
@@ -128,12 +163,15 @@ class _RunView(NamedTuple):
     convergence: Convergence
     tiles: list[Tile]
     pictures: list[Picture]
+    more_pictures: list[Picture]
     uncertainties: list[tuple[str, str]]
     notes: list[str]
 
 
 def _view(run: Run, number: int, numbered: bool) -> _RunView:
     scalars = run.scalars()
+    shown = SHOWN_OF_SEVERAL if numbered else SHOWN
+    pictures = [exhibit.picture() for exhibit in run_exhibits(run)]
     roughness = quantity("sq_m").named(run.state.sq)
     return _RunView(
         label=f"{number}. {roughness}" if numbered else roughness,
@@ -142,13 +180,14 @@ def _view(run: Run, number: int, numbered: bool) -> _RunView:
         scalars=scalars,
         convergence=run.solution.convergence,
         tiles=[tile(quantity(key), scalars) for key in TILES],
-        pictures=[exhibit.picture() for exhibit in _exhibits(run)],
+        pictures=pictures[:shown],
+        more_pictures=pictures[shown:],
         uncertainties=uncertainty_rows(run.error, run.friction_interval),
         notes=[*run.remarks, *_missing_exhibits(run)],
     )
 
 
-def _exhibits(run: Run) -> Iterator[Exhibit]:
+def run_exhibits(run: Run) -> Iterator[Exhibit]:
     """Yield the exhibits of a run in the order of the page."""
     yield contact.contact_map(run)
     yield contact.film_map(run)

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from asperity.core.quantities import quantity
 from asperity.report.base import Exhibit
-from asperity.report.drawing import PANELS_PER_ROW, display, legend_below, panels_in_rows
+from asperity.report.drawing import display, legend_below, panels_in_rows, panels_per_row
 from asperity.report.maps import contact_colours, contact_keys, mark_hertz_zone, show_map
 from asperity.report.style import Medium, Style
 from asperity.results import Run
@@ -31,18 +31,18 @@ def contact_maps(runs: Sequence[Run]) -> Exhibit:
                 fontweight="normal",
                 fontsize="small",
             )
-        _label_outer(panels)
+        _label_outer(panels, panels_per_row(medium, len(runs)))
         keys = contact_keys(
             "asperity contact", *(("open gap",) if dry else ("oil film", "cavitated"))
         )
-        legend_below(figure, 4 if len(runs) > 2 else 2, handles=keys)
+        legend_below(figure, panels_per_row(medium, max(len(runs), 2)), handles=keys)
         return figure
 
     values = "; ".join(f"{_sq(run)}: {', '.join(_shares(run))}" for run in runs)
     return Exhibit(
         "contact-maps",
         draw,
-        "Contact state of one surface per level: asperity contact yellow, oil film red, cavitated "
+        "Contact state of one surface per level: asperity contact yellow, oil film blue, cavitated "
         "film striped; oil enters from the left. The shares are those of the surface shown.",
         f"Contact maps. {values}.",
     )
@@ -59,7 +59,7 @@ def surface_maps(runs: Sequence[Run]) -> Exhibit:
         for run, field, axes, letter in zip(runs, heights, panels, "abcdefgh", strict=False):
             image = show_map(axes, field, run.solution, cmap="cividis", vmin=-limit, vmax=limit)
             axes.set_title(f"({letter}) {_sq(run)}", fontweight="normal")
-        _label_outer(panels)
+        _label_outer(panels, panels_per_row(medium, len(runs)))
         style: Style = {"location": "bottom", "shrink": 0.5, "aspect": 40, "extend": "both"}
         figure.colorbar(image, ax=panels, label=quantity(key).axis, **style)
         return figure
@@ -84,7 +84,7 @@ def _sheet(
     runs: Sequence[Run], medium: Medium, *, above: float, below: float
 ) -> tuple[Figure, list[Axes]]:
     """Create a figure of map panels, with `above` and `below` lines of text reserved."""
-    columns = min(PANELS_PER_ROW, len(runs))
+    columns = panels_per_row(medium, len(runs))
     rows = -(-len(runs) // columns)
     extent = runs[0].case.grid.extent
     line = medium.line_height
@@ -94,15 +94,16 @@ def _sheet(
         rows * (panel * min(max(extent[1] / extent[0], 0.15), 1.4) + above * line) + below * line
     )
     figure = Figure(figsize=(width, height), layout="compressed")
-    return figure, panels_in_rows(figure, len(runs), sharex=True, sharey=True)
+    return figure, panels_in_rows(figure, len(runs), columns, sharex=True, sharey=True)
 
 
-def _label_outer(panels: Sequence[Axes]) -> None:
-    """Label only the leftmost and the lowest panels of each column."""
-    columns = min(PANELS_PER_ROW, len(panels))
+def _label_outer(panels: Sequence[Axes], columns: int) -> None:
+    """Label only the leftmost and the lowest panels of each column; briefly in several rows."""
+    across = quantity("y_m")
+    label = across.axis if columns >= len(panels) else f"y [{across.display}]"
     for number, axes in enumerate(panels):
         lowest = number + columns >= len(panels)
         leftmost = number % columns == 0
         axes.set_xlabel(quantity("x_m").axis if lowest else "")
-        axes.set_ylabel(quantity("y_m").axis if leftmost else "")
+        axes.set_ylabel(label if leftmost else "")
         axes.tick_params(labelbottom=lowest, labelleft=leftmost)

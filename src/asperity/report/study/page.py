@@ -39,8 +39,8 @@ def write_study_report(
     result : from `run_study` or `load_study`; missing, failed and unconverged cases are listed and
         excluded from all means
     path : file to write; its folder must exist
-    figures : folder for each figure as PDF and PNG (300 dpi, 84 or 174 mm wide), `captions.md` and
-        the tables as csv; created if missing
+    figures : folder for each figure as PDF (85 and 175 mm wide), `captions.md` and the tables as
+        csv; created if missing
     anchors : reference values of a study of Sq (default: the paper's published values, if it
         is the paper's contact)
     progress : called with a description of each step
@@ -57,7 +57,9 @@ def write_study_report(
     """
     require_writable(Path(path))
     study = StudyOverview(result, anchors, progress)
-    folder = None if figures is None else _folder(Path(figures))
+    folder = None if figures is None else Path(figures)
+    if folder is not None:
+        make_folder(folder)  # refused before anything is drawn
     messages = progress or (lambda _: None)
 
     def page() -> str:
@@ -69,12 +71,6 @@ def write_study_report(
         return text
 
     return write_page(path, page)
-
-
-def _folder(path: Path) -> Path:
-    make_folder(path)
-    require_writable(path / "captions.md")
-    return path
 
 
 def _write_tables(study: StudyOverview, folder: Path) -> None:

@@ -17,11 +17,11 @@ from asperity.core.coverage import COVERAGE
 from asperity.core.quantities import quantity
 from asperity.report.base import Exhibit
 from asperity.report.drawing import (
-    PANELS_PER_ROW,
     display,
     draw_intervals,
     legend_below,
     panels_in_rows,
+    panels_per_row,
 )
 from asperity.report.study.curve import limit_to_data
 from asperity.report.study.quantity_names import axis_label, value_label
@@ -54,9 +54,9 @@ def output_curves(study: StudyOverview, axis: SweptAxis) -> Exhibit:
     def draw(medium: Medium) -> Figure:
         figure, panels = _panel_figure(len(study.outputs), medium, shape=0.85, legend_lines=1.6)
         for key, axes in zip(study.outputs, panels, strict=True):
-            _draw_output(axes, axis, display(key, study.used[key].to_numpy(dtype=float)))
+            _draw_output(axes, axis, key, study.used[key].to_numpy(dtype=float))
             axes.set_title(quantity(key).label, fontweight="normal", fontsize="small")
-        for axes in panels[-min(PANELS_PER_ROW, len(panels)) :]:
+        for axes in panels[-panels_per_row(medium, len(panels)) :]:
             axes.set_xlabel(axis_label(axis))
         mean: Style = {"color": BLUE, "marker": "o", "markersize": 3.5}
         interval = f"mean, {100 * COVERAGE:.0f} % interval"
@@ -82,13 +82,15 @@ def _file_name(axis: SweptAxis) -> str:
     return axis.key.replace(".", "-").replace("_", "-")
 
 
-def _draw_output(axes: Axes, axis: SweptAxis, values: Field) -> None:
-    finite = np.isfinite(values)
+def _draw_output(axes: Axes, axis: SweptAxis, key: str, stored: Field) -> None:
+    finite = np.isfinite(stored)
+    values = display(key, stored)
     dots: Style = {"color": GREY, "alpha": 0.6, "markersize": 4.5, "markeredgewidth": 0}
     axes.plot(
         axis.values[finite], values[finite], ".", rasterized=values.size > MAX_VECTOR_DOTS, **dots
     )
-    x, mean, low, high = group_means(axis.values[finite], values[finite], binned=axis.binned)
+    x, *means = group_means(key, axis.values[finite], stored[finite], binned=axis.binned)
+    mean, low, high = (display(key, column) for column in means)
     style: Style = {"linestyle": "none" if axis.names else "-", "color": BLUE, "markersize": 3.5}
     draw_intervals(axes, x, mean, [mean - low, high - mean], "o", **style)
     limit_to_data(axes, values[finite])
@@ -111,13 +113,13 @@ def _panel_figure(
     count: int, medium: Medium, *, shape: float, legend_lines: float
 ) -> tuple[Figure, list[Axes]]:
     """Create a figure with `count` equal panels in rows."""
-    columns = min(PANELS_PER_ROW, count)
+    columns = panels_per_row(medium, count)
     rows = -(-count // columns)
     line = medium.line_height
     width = medium.width(columns)
     height = rows * (width / columns * shape + 1.0 * line) + (2.0 + legend_lines) * line
     figure = Figure(figsize=(width, height), layout="constrained")
-    return figure, panels_in_rows(figure, count)
+    return figure, panels_in_rows(figure, count, columns)
 
 
 def output_maps(study: StudyOverview, x_axis: SweptAxis, y_axis: SweptAxis) -> Exhibit:

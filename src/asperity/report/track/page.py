@@ -106,10 +106,25 @@ def render_track_page(track: Track) -> str:
     )
 
 
-def _forecast_picture(track: Track) -> Picture | None:
+def track_exhibits(track: Track) -> list[Exhibit]:
+    """Return the figures of the page, the trend first."""
+    ahead = _forecast_exhibit(track)
+    return [
+        *([exhibits.trend(track)] if track.resonance_count else []),
+        *([] if ahead is None else [ahead]),
+        *_details(track),
+    ]
+
+
+def _forecast_exhibit(track: Track) -> Exhibit | None:
     """Draw the forecast; None if none was requested or possible."""
     bands = None if track.forecast is None else track.forecast.bands
-    return None if bands is None else forecast_exhibit(bands, exhibits.x_label(track)).picture()
+    return None if bands is None else forecast_exhibit(bands, exhibits.x_label(track))
+
+
+def _forecast_picture(track: Track) -> Picture | None:
+    ahead = _forecast_exhibit(track)
+    return None if ahead is None else ahead.picture()
 
 
 def _with_clr(track: Track) -> bool:

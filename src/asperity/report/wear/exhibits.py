@@ -12,7 +12,7 @@ from asperity.core.arrays import Field
 from asperity.core.quantities import quantity
 from asperity.paper import CRF_ENDS_HZ, SAMPLES_SQ_UM
 from asperity.report.base import Exhibit
-from asperity.report.drawing import display, legend_below, name_axes, panels_in_rows
+from asperity.report.drawing import display, legend_below, name_axes, one_panel, panels_in_rows
 from asperity.report.style import BLUE, DASHED, GREEN, GREY, VERMILION, Medium, Style
 from asperity.simulation import WearHistory
 from asperity.surface import Surface, bearing_curve
@@ -86,6 +86,26 @@ def curves(history: WearHistory) -> Exhibit:
         "step." + (k_note if history.k_interval is not None else ""),
         "Roughness parameters, load and area shares, film, friction, flash temperature, wear depth "
         "and CRFA over hours",
+    )
+
+
+def headline(history: WearHistory) -> Exhibit:
+    """Draw the asperity load share over hours: the result of a wear simulation in one panel."""
+    first, last = (float(history.table["clr"].iloc[row]) for row in (0, -1))
+    share = quantity("clr")
+
+    @one_panel(3.0, legend_columns=0)
+    def draw(axes: Axes) -> None:
+        _draw_over_hours(axes, history, "clr", VERMILION, "-o")
+        title = f"{share.short} {share.number(first)} to {share.text(last)}"
+        axes.set(xlabel=quantity("hours").axis, ylabel=share.axis, title=title, ylim=(0.0, None))
+
+    return Exhibit(
+        "load-share",
+        draw,
+        "Load carried by asperities over the hours. Band: 90 % interval of the mean over the "
+        "positions of a step.",
+        f"Asperity load share over hours, from {share.text(first)} to {share.text(last)}.",
     )
 
 

@@ -1,5 +1,7 @@
 """HTML report of a wear history: verdict, resonance, curves, animated maps, surfaces, limits."""
 
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -8,7 +10,7 @@ import pandas
 from asperity.core.quantities import in_print, quantity
 from asperity.paper import is_papers_contact
 from asperity.report import animated_maps
-from asperity.report.base import Picture, heading, render, tile, write_page
+from asperity.report.base import Exhibit, Picture, heading, render, tile, write_exhibits, write_page
 from asperity.report.wear import exhibits
 from asperity.simulation import WearFrame, WearHistory, body_column
 
@@ -52,15 +54,35 @@ class ComparisonRow(NamedTuple):
     unit: str
 
 
-def write_wear_report(history: WearHistory, path: str | Path) -> Path:
+def write_wear_report(
+    history: WearHistory, path: str | Path, *, figures: str | Path | None = None
+) -> Path:
     """Write a self-contained HTML report of a wear history, atomically.
+
+    `figures` is a folder for each figure as PDF (85 and 175 mm wide) and `captions.md`.
 
     Raises
     ------
     BadInput
         for a path that is not writable.
     """
-    return write_page(path, lambda: render_wear_page(history))
+    page = write_page(path, lambda: render_wear_page(history))
+    if figures is not None:
+        write_exhibits(wear_exhibits(history), figures)
+    return page
+
+
+def wear_exhibits(history: WearHistory) -> Iterator[Exhibit]:
+    """Yield the exhibits of a report: resonance, curves, surfaces before and after, profiles."""
+    yield exhibits.headline(history)
+    if history.table["crf_hz"].notna().any():
+        yield exhibits.resonance(history, papers=is_papers_contact(history.case))
+    yield exhibits.curves(history)
+    tracks = exhibits.worn_tracks(history)
+    for number, track in enumerate(tracks, 1):
+        yield replace(exhibits.surface_maps(track), name=f"surface-{number}")
+    if tracks:
+        yield exhibits.profiles(tracks)
 
 
 def render_wear_page(history: WearHistory) -> str:
@@ -76,6 +98,7 @@ def render_wear_page(history: WearHistory) -> str:
         title="Wear of a contact",
         history=history,
         tiles=[tile(quantity(key), history.row_at(-1)) for key in TILES if last[key] == last[key]],
+        headline=exhibits.headline(history).picture(),
         resonance=_resonance(history),
         maps=animated_maps.animated_maps(history.case, scale),
         curves=exhibits.curves(history).picture(),

@@ -12,6 +12,7 @@ from asperity.case import Case
 from asperity.core.arrays import usual_float_errors
 from asperity.core.errors import BadInput, NotConverged
 from asperity.core.limits import require_affordable
+from asperity.core.notebook import notebook_progress
 from asperity.simulation.motion.history import History, steps_a_pass
 from asperity.simulation.motion.rows import Row, step_row
 from asperity.simulation.motion.store import open_recorder
@@ -25,6 +26,14 @@ MODELS: dict[str, Steps] = {  # by the case's `model`
     "conserving": moving_contact,
 }
 STEP_S, ROW_BYTES = 1e-5, 2000.0  # cost of a step: time per cell [s], memory [B]
+
+
+def _ignore(state: "HistoryProgress") -> None:
+    """Report no progress."""
+
+
+def _progress_text(state: "HistoryProgress") -> tuple[float, str]:
+    return state.number / max(state.steps, 1), f"step {state.number} of {state.steps}"
 
 
 class HistoryProgress(NamedTuple):
@@ -68,6 +77,7 @@ def run_history(
     surfaces, model = _moving_parts(case)
     last = _last_step(case, surfaces, steps, passes)
     began = time.perf_counter()
+    report = progress or notebook_progress("Motion", _progress_text) or _ignore
     # sums over several threads depend on their number, and vectors this short run slower on them
     with open_recorder(case, surfaces, last, out, every) as recorder, threadpool_limits(1):
         before = len(recorder.rows)
@@ -86,17 +96,22 @@ def run_history(
                 row = step_row(snapshot, case, recorder.rows[-1] if recorder.rows else None)
                 failed = strict and not row["converged"]
                 recorder.record(snapshot, row, failed=failed)
-                if progress is not None:
-                    progress(HistoryProgress(snapshot.number, last, row))
+                report(HistoryProgress(snapshot.number, last, row))
                 if failed or snapshot.number >= last:
                     break
         history = recorder.history(time.perf_counter() - began, len(recorder.rows) - before)
-    if strict and history.failed:
+    if strict:
+        _require_converged(history, last)
+    return history
+
+
+def _require_converged(history: History, last: int) -> None:
+    """Raise NotConverged for a history with a failed step."""
+    if history.failed:
         where = f"step {history.failed[0]} of {last} did not converge"
         raise NotConverged(
             history, f"{where}; earlier steps are valid, strict=False marks it and continues"
         )
-    return history
 
 
 def _moving_parts(case: Case) -> tuple[MovingSurfaces, Steps]:

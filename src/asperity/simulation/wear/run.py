@@ -10,6 +10,7 @@ from asperity.case import Case
 from asperity.core.arrays import usual_float_errors
 from asperity.core.errors import AsperityError, BadInput, NotConverged, require_positive
 from asperity.core.limits import require_affordable
+from asperity.core.notebook import notebook_progress
 from asperity.simulation.wear.contact import (
     BatchSolver,
     FailedPosition,
@@ -83,6 +84,13 @@ def run_wear(
         open_recorder(contact, out) as recorder,
         position_solvers(contact.solver, workers) as solve,
     ):
+        progress = progress or notebook_progress(
+            "Wear",
+            lambda state: (
+                state.hours / state.of_hours,
+                f"{state.hours:.3g} of {state.of_hours:.3g} h",
+            ),
+        )
         computed = _advance(contact, recorder, solve, end, progress)
         return recorder.history(time.perf_counter() - began, computed)
 

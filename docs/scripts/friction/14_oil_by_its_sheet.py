@@ -28,3 +28,4 @@ for name in ESTIMATORS:
 right.set(xlabel="temperature [°C]", ylabel="alpha of VG 100 [1/GPa]", ylim=(0, None))
 right.legend(fontsize="small")
 figure.tight_layout()
+# sphinx_gallery_thumbnail_number = -1

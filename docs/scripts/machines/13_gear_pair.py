@@ -7,11 +7,14 @@ Two pairs of teeth share the load, except in the middle, where one pair carries 
 a separate contact with its own film.
 """
 
+from pathlib import Path
+
 import matplotlib.pyplot as plt
 import numpy as np
 
 import asperity as asp
-from asperity import ehl, machine
+from asperity import ehl, machine, machines
+from asperity.case import case_template, load_machine
 
 # FZG's gears of type C
 gears = machine.SpurGear(
@@ -52,3 +55,9 @@ for contact, x in zip(contacts, place, strict=True):
 for axis in axes[1]:
     axis.set(xlabel="along the path of contact [mm]")
 figure.tight_layout()
+
+# %%
+# A gear pair from a case file, drawn to scale; `asperity machine` solves its contacts.
+Path("gear.toml").write_text(case_template("gear"), encoding="utf-8")
+machines.machine_conditions(load_machine("gear.toml")).plot()
+# sphinx_gallery_thumbnail_number = 2

@@ -7,10 +7,13 @@ fewer with larger clearance. Each roller is a separate contact; the most loaded 
 ratings and film thickness.
 """
 
+from pathlib import Path
+
 import matplotlib.pyplot as plt
 import numpy as np
 
-from asperity import machine
+from asperity import machine, machines
+from asperity.case import case_template, load_machine
 
 figure, axis = plt.subplots(figsize=(7, 4))
 for clearance in (0.0, 20e-6, 50e-6):
@@ -38,3 +41,9 @@ for clearance in (0.0, 20e-6, 50e-6):
 axis.axhline(4 * 4000 / 13, ls=":", color="0.4", label="4 F / Z")
 axis.set(xlabel="angle from the load's direction [deg]", ylabel="load on the roller [N]")
 axis.legend()
+
+# %%
+# A bearing from a case file, drawn to scale; `asperity machine` solves its contacts.
+Path("bearing.toml").write_text(case_template("bearing"), encoding="utf-8")
+machines.machine_conditions(load_machine("bearing.toml")).plot()
+# sphinx_gallery_thumbnail_number = 2

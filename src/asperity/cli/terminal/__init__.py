@@ -1,0 +1,1 @@
+"""Output fitted to the terminal: commands grouped by task, lines within its width."""
