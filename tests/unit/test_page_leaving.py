@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("panel", reason="the extra page is not installed")
 
-from asperity.app.session_cleanup import DISCONNECT_MS, SessionSweeper
+from asperity.app.serving.session_cleanup import DISCONNECT_MS, SessionSweeper
 
 
 class Session:

@@ -13,8 +13,10 @@ from asperity.core.errors import BadInput, UnreadableFile
 
 pytest.importorskip("panel", reason="the extra page is not installed")
 
-from asperity.app import open_page, server
-from asperity.app.server import PASSWORD, origins, password_for, require_free
+from asperity.app import open_page, uploads
+from asperity.app.serving import server
+from asperity.app.serving.access import PASSWORD, host_names, password_for
+from asperity.app.serving.server import require_free
 from asperity.app.uploads import FileDrop, safe_name
 from asperity.app.widgets import sentences, tiles
 
@@ -39,7 +41,7 @@ def test_local_access_needs_no_password(monkeypatch):
     monkeypatch.delenv(PASSWORD, raising=False)
     for address in ("127.0.0.1", "::1", "localhost"):
         assert password_for(address) is None
-    assert origins("127.0.0.1", 5006) == ["127.0.0.1:5006", "localhost:5006"]
+    assert host_names("127.0.0.1", 5006) == {"127.0.0.1:5006", "localhost:5006", "[::1]:5006"}
 
 
 @pytest.mark.parametrize("address", ["0.0.0.0", "::", "192.0.2.7", "example.org"])
@@ -56,11 +58,13 @@ def test_remote_access_needs_a_password(monkeypatch, address, password):
     assert password_for(address) == "long enough"
 
 
-def test_only_the_pages_own_host_names_may_connect():
-    assert origins("192.0.2.7", 80) == ["192.0.2.7:80"]
-    assert origins("2001:db8::1", 80) == ["[2001:db8::1]:80"]
-    all_interfaces = origins("0.0.0.0", 80)
-    assert {"127.0.0.1:80", "localhost:80", f"{socket.gethostname()}:80"} <= set(all_interfaces)
+def test_a_server_answers_to_its_own_host_names():
+    assert host_names("192.0.2.7", 80) == {"192.0.2.7", "192.0.2.7:80"}
+    assert host_names("2001:db8::1", 81) == {"[2001:db8::1]:81"}
+    assert host_names("Example.org", 81) == {"example.org:81"}
+    all_interfaces = host_names("0.0.0.0", 81)
+    host = socket.gethostname().lower()
+    assert {"127.0.0.1:81", "localhost:81", f"{host}:81", f"{host}.local:81"} <= all_interfaces
     assert "*" not in "".join(all_interfaces)
 
 
@@ -118,7 +122,9 @@ def test_an_upload_is_written_in_chunks_and_removed_with_its_session():
         [(1, 2, b"x" * 600), (2, 2, b"x" * 600)],  # over the limit
         [(1, 3, b"x"), (3, 3, b"x")],  # one chunk is missing
         [(1, "many", b"x")],
+        [(1, float("inf"), b"x")],
         [(1, 1, None)],
+        [(1, 1, 10**12)],
     ],
 )
 def test_too_large_or_damaged_uploads_are_refused(pieces):
@@ -128,6 +134,25 @@ def test_too_large_or_damaged_uploads_are_refused(pieces):
     drop._process_event(piece(2, 2, b"late"))
     assert paths == []
     assert len(errors) == 1
+    drop.close()
+
+
+def test_the_uploads_of_a_visit_are_limited(monkeypatch):
+    monkeypatch.setattr(uploads, "MAX_VISIT", 2500)
+    drop, paths, errors = drop_of(1000)
+    for _ in range(5):
+        drop._process_event(piece(1, 2, b"x" * 800))  # begun again under one name
+    assert len(errors) == 2
+    assert "in one visit" in errors[0]
+    kept = sum(path.stat().st_size for path in drop.folder.rglob("*.csv"))
+    assert (paths, kept <= 800) == ([], True)
+    drop.close()
+    monkeypatch.setattr(uploads, "MAX_FILES", 3)
+    drop, paths, errors = drop_of(1000)
+    for number in range(5):
+        drop._process_event(piece(1, 1, b"x", f"{number}.csv"))
+    assert (len(paths), len(errors)) == (3, 2)
+    assert len(list(drop.folder.iterdir())) == 3
     drop.close()
 
 

@@ -10,6 +10,12 @@ from panel.widgets import FileDropper
 
 CHUNK_SIZE = 4_000_000  # bytes
 MAX_NAME = 80  # characters of a file name
+MAX_VISIT = 1_000_000_000  # bytes of all files of a visit
+MAX_FILES = 10_000  # of a visit
+_VISIT_FULL = (
+    f"more than {MAX_VISIT // 1_000_000} MB or {MAX_FILES} files in one visit; reload the page to "
+    "drop others"
+)
 _UNSAFE = re.compile(r"[^\w.\-]+")
 
 
@@ -45,7 +51,7 @@ class FileDrop(FileDropper):  # type: ignore[misc]
         self._limit, self._on_file, self._on_error = limit, on_file, on_error
         self._folder: TemporaryDirectory[str] | None = None
         self._open: dict[str, tuple[Path, int, int]] = {}  # path, chunks and bytes so far
-        self._count = 0
+        self._count, self._received = 0, 0  # files and bytes of the visit
 
     @property
     def folder(self) -> Path:
@@ -61,6 +67,12 @@ class FileDrop(FileDropper):  # type: ignore[misc]
             self._folder = None
         self._open.clear()
 
+    def _problem(self, size: int, added: int, *, in_order: bool) -> str:
+        """Return why a chunk is refused, "" if it is not."""
+        if size > self._limit or not in_order:
+            return f"larger than {self._limit // 1_000_000} MB, or a chunk is missing"
+        return _VISIT_FULL if self._received + added > MAX_VISIT else ""
+
     def _process_event(self, event: Any) -> None:
         """Write a chunk to disk, instead of keeping it in memory as Panel does."""
         if event.event_name != "upload_event":
@@ -71,11 +83,16 @@ class FileDrop(FileDropper):  # type: ignore[misc]
         try:
             number = int(chunk["chunk"])
             total = int(chunk["total_chunks"])
-            data = data.encode() if isinstance(data, str) else bytes(data)
-        except (KeyError, TypeError, ValueError):
+            data = data.encode() if isinstance(data, str) else memoryview(data)
+        except (KeyError, TypeError, ValueError, OverflowError):
             self._on_error("A chunk of the file was damaged. Drop the file again.")
             return
         if number == 1:
+            if name in self._open:
+                self._open.pop(name)[0].unlink(missing_ok=True)
+            if self._count >= MAX_FILES:
+                self._on_error(f"{safe_name(name)} was rejected: {_VISIT_FULL}.")
+                return
             self._count += 1
             folder = self.folder / str(self._count)
             folder.mkdir()
@@ -83,14 +100,15 @@ class FileDrop(FileDropper):  # type: ignore[misc]
         if name not in self._open:
             return  # a rejected file
         path, chunks, size = self._open[name]
-        if size + len(data) > self._limit or number != chunks + 1:
+        problem = self._problem(size + len(data), len(data), in_order=number == chunks + 1)
+        if problem:
             del self._open[name]
             path.unlink(missing_ok=True)
-            limit = f"larger than {self._limit // 1_000_000} MB, or a chunk is missing"
-            self._on_error(f"{safe_name(name)} was rejected: {limit}.")
+            self._on_error(f"{safe_name(name)} was rejected: {problem}.")
             return
         with path.open("ab") as file:
             file.write(data)
+        self._received += len(data)
         self._open[name] = (path, number, size + len(data))
         if number == total:
             del self._open[name]

@@ -1,5 +1,6 @@
 """`asperity page`: the live page, until interrupted."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -39,7 +40,9 @@ def page_command(
 
         opened = open_page(source)
         tools = ReportTools(report.write_report, report.machine_drawing)
-        serve_page(opened, port=port, listen=listen, ready=_ready, tools=tools)
+        serve_page(
+            opened, port=port, listen=listen, ready=partial(_print_address, listen), tools=tools
+        )
     except ModuleNotFoundError as missing:
         if (missing.name or "").partition(".")[0] not in (
             "panel",
@@ -51,5 +54,10 @@ def page_command(
         raise BadInput("the live page needs Panel; pip install 'asperity[page]'") from None
 
 
-def _ready(address: str) -> None:
+def _print_address(listen: str, address: str) -> None:
     print(f"The live page is at {address} until Ctrl-C.", flush=True)
+    if listen not in ("127.0.0.1", "::1", "localhost"):
+        print(
+            "Others open the address of this machine and its port, and enter the password.",
+            flush=True,
+        )

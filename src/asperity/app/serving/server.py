@@ -1,9 +1,6 @@
 """Server of the live page: local by default, one document per visit, no external resources."""
 
-import ipaddress
 import logging
-import os
-import secrets
 import socket
 from collections.abc import Callable
 from functools import partial
@@ -26,53 +23,26 @@ from asperity.app import study_page as study
 from asperity.app.jobs import WorkerPool
 from asperity.app.opening import OpenedPage
 from asperity.app.recording_jobs import RecordingContext
-from asperity.app.session_cleanup import CLEANUP_MS, SessionSweeper, freeze_objects
+from asperity.app.serving.access import (
+    LOCALHOST,
+    MAX_BODY,
+    AccessPolicy,
+    password_for,
+)
+from asperity.app.serving.session_cleanup import CLEANUP_MS, SessionSweeper, freeze_objects
 from asperity.app.settings import Settings
 from asperity.app.surface_store import SurfaceStore
 from asperity.app.widgets import PageBlock, PageSection
 from asperity.case import Case
 from asperity.core.errors import BadInput
 
-LOCALHOST = "127.0.0.1"
 PORT = 5006
-PASSWORD = "ASPERITY_PAGE_PASSWORD"
-USER = "asperity"  # common user name, fixed in the login form
-MIN_PASSWORD = 8  # characters
 FOLDER_CHECK_MS, FRAME_MS = 5000, 250  # intervals of folder checks, and of frames of a history
+CONNECTION_CHECK_MS = 50  # interval, until the browser of a visit is connected
 READY_MS = 4000  # figures are created after this time even without a ready event
 UNUSED_MS = 120_000  # lifetime of a session before its browser connects
 PING_S = 120  # interval of keep-alive pings, and the time to answer
 MAX_MESSAGE = 24_000_000  # bytes that a browser may send at a time
-
-
-def origins(address: str, port: int) -> list[str]:
-    """Return the permitted websocket origins: the names of this server."""
-    names = {LOCALHOST, "localhost"} if _is_local(address) else {address}
-    if address in ("0.0.0.0", "::"):
-        names = {LOCALHOST, "localhost", socket.gethostname()}
-        names |= {str(info[4][0]) for info in socket.getaddrinfo(socket.gethostname(), None)}
-    return sorted(f"[{name}]:{port}" if ":" in name else f"{name}:{port}" for name in names)
-
-
-def _is_local(address: str) -> bool:
-    try:
-        return ipaddress.ip_address(address).is_loopback
-    except ValueError:
-        return address == "localhost"
-
-
-def password_for(address: str) -> str | None:
-    """Return the password for remote access, None for a local address; BadInput if missing."""
-    if _is_local(address):
-        return None
-    password = os.environ.get(PASSWORD, "")
-    if len(password) < MIN_PASSWORD:
-        raise BadInput(
-            f"--listen {address} allows remote access, which requires a password; set the "
-            f"environment variable {PASSWORD} to at least {MIN_PASSWORD} characters, or omit "
-            "--listen"
-        )
-    return password
 
 
 def require_free(address: str, port: int) -> int:
@@ -129,7 +99,7 @@ class PageSite:
             self.surfaces,
         )
         parts, sections = contact.layout(view)
-        view.begin(_query(), self.opened.result)
+        _when_connected(partial(view.begin, _query(), self.opened.result))
         _document().on_event("document_ready", lambda _event: view.create_next_figure())
         _document().add_timeout_callback(
             view.create_next_figure, READY_MS
@@ -147,8 +117,9 @@ class PageSite:
         view = recordings.RecordingsView(folder, context, self.worker_pool, _deliver())
         panel.state.on_session_destroyed(lambda _context: view.close())
         if folder is not None:
-            _document().add_periodic_callback(view.refresh, FOLDER_CHECK_MS)
-            view.refresh()
+            add_check = partial(_document().add_periodic_callback, view.refresh, FOLDER_CHECK_MS)
+            _when_connected(add_check)
+            _when_connected(view.refresh)
         return self._page("recordings", "Recordings", *recordings.layout(view))
 
     def study(self) -> Any:
@@ -157,7 +128,7 @@ class PageSite:
         assert isinstance(self.opened.case, Case)
         view = study.StudyView(self.opened.path, self.opened.case, self.worker_pool, _deliver())
         panel.state.on_session_destroyed(lambda _context: view.close())
-        view.begin()
+        _when_connected(view.begin)
         return self._page("study", "Study", *study.layout(view))
 
     def history(self) -> Any:
@@ -166,7 +137,7 @@ class PageSite:
         view = history.HistoryView(self.opened.path, self.worker_pool, _deliver())
         panel.state.on_session_destroyed(lambda _context: view.close())
         _document().add_periodic_callback(view.advance, FRAME_MS)
-        view.begin()
+        _when_connected(view.begin)
         return self._page("history", "History", *history.layout(view))
 
     def pages(self) -> dict[str, Callable[[], Any]]:
@@ -228,7 +199,7 @@ class _DisconnectFilter(logging.Filter):
 def _limit_logging() -> None:
     """Log errors, not connections and disconnections."""
     logging.getLogger("asyncio").addFilter(_DisconnectFilter())
-    for name in ("bokeh.server.views.ws", "tornado.access"):
+    for name in ("bokeh.server.util", "bokeh.server.views.ws", "tornado.access"):
         logging.getLogger(name).setLevel(logging.ERROR)
 
 
@@ -245,6 +216,22 @@ def _deliver() -> Callable[[Callable[[], None]], None]:
             document.add_next_tick_callback(function)
 
     return partial(loop.add_callback, add)
+
+
+def _when_connected(function: Callable[[], None]) -> None:
+    """Call a function once the browser of this visit is connected: a request alone starts no work.
+
+    Any web site can make a browser send requests, but connects only from a page of this server.
+    """
+    document = _document()
+
+    def check() -> None:
+        session = document.session_context and document.session_context.session
+        if session and session.connection_count > 0:
+            document.remove_periodic_callback(periodic)
+            function()
+
+    periodic = document.add_periodic_callback(check, CONNECTION_CHECK_MS)
 
 
 def _document() -> Any:
@@ -288,7 +275,7 @@ def serve_page(
     opened : from `open_page`
     port : 0 for a free one
     listen : address to listen on; remote access needs a password in `ASPERITY_PAGE_PASSWORD`
-    ready : called with the address of the page when it is available
+    ready : called with the address of the page, which contains the token, when it is available
     tools : `write_report` and `machine_drawing` of `asperity.report`
 
     Raises
@@ -303,16 +290,11 @@ def serve_page(
     site = PageSite(opened, worker_pool, tools)
     try:
         worker_pool.warm_up()
-        login: dict[str, Any] = {}
-        if password is not None:  # with a user name: Panel may take a bare password for a file name
-            template = str(files("asperity.app").joinpath("login.html.j2"))
-            login = {"basic_auth": {USER: password}, "basic_login_template": template}
-            login["cookie_secret"] = secrets.token_hex(32)
         server = panel.serve(
             site.pages(),
             port=port,
             address=listen,
-            websocket_origin=origins(listen, port),
+            websocket_origin="*",  # the access policy examines every request
             show=False,
             start=False,
             verbose=False,
@@ -325,12 +307,14 @@ def serve_page(
             check_unused_sessions_milliseconds=CLEANUP_MS,
             unused_session_lifetime_milliseconds=UNUSED_MS,
             websocket_max_message_size=MAX_MESSAGE,
-            **login,
+            http_server_kwargs={"max_body_size": MAX_BODY},
         )
+        policy = AccessPolicy(listen, port, list(site.pages()), password)
+        policy.install(server._tornado)
         server.start()
         freeze_objects()
         PeriodicCallback(SessionSweeper(server.get_sessions).sweep, CLEANUP_MS).start()
-        ready(f"http://{f'[{listen}]' if ':' in listen else listen}:{port}/")
+        ready(policy.printed_address())
         server.io_loop.start()
     finally:
         worker_pool.close()

@@ -1,0 +1,5 @@
+"""Server of the live page: access, headers, and cleanup of sessions."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
