@@ -45,7 +45,7 @@ TURN = """([key, text]) => new Promise(done => {
 
 @contextmanager
 def _server(folder: Path) -> Iterator[tuple[str, int]]:
-    """Run the page's server; yields its address and process number."""
+    """Run the page's server; yields the address that it prints, and its process number."""
     process = subprocess.Popen(
         [sys.executable, "-m", "asperity", "page", "--port", "0"],
         stdout=subprocess.PIPE,
@@ -54,7 +54,7 @@ def _server(folder: Path) -> Iterator[tuple[str, int]]:
     )
     try:
         assert process.stdout is not None
-        found = re.search(r"http://\S+/", process.stdout.readline())
+        found = re.search(r"http://\S+", process.stdout.readline())
         assert found is not None
         yield found[0], process.pid
     finally:
@@ -62,14 +62,19 @@ def _server(folder: Path) -> Iterator[tuple[str, int]]:
         process.wait(60)
 
 
+def _address(printed: str, page: str, query: str = "") -> str:
+    """Return the address of a page with the token."""
+    return f"{printed.replace('?', f'{page}?')}{query}"
+
+
 def _knob(rng: random.Random) -> tuple[str, str]:
     """Draw a setting and a value for it."""
     return rng.choice(
         [
-            ("Load, F", f"{rng.uniform(300, 900):.0f} N"),
+            ("Normal load, F", f"{rng.uniform(300, 900):.0f} N"),
             ("Entrainment speed, u", f"{rng.uniform(1, 4):.3g} m/s"),
             ("Composite roughness, Sq", f"{rng.uniform(0.5, 2):.3g} um"),
-            ("Viscosity, η₀", f"{rng.uniform(0.05, 0.2):.3g} Pa s"),
+            ("Dynamic viscosity, η₀", f"{rng.uniform(0.05, 0.2):.3g} Pa s"),
         ]
     )
 
@@ -134,7 +139,7 @@ def _memory(browser: Any, url: str, process: int, count: int) -> tuple[float, fl
     def visits(number: int) -> None:
         for _ in range(number):
             page = browser.new_page()
-            page.goto(f"{url}contact")
+            page.goto(_address(url, "contact"))
             page.locator(".block.film .bk-Figure").wait_for(timeout=120_000)
             page.close()
 
@@ -159,7 +164,7 @@ def lines(*, fast: bool) -> Iterator[str]:
         with sync_playwright() as driver:
             browser = driver.chromium.launch(executable_path=path, args=["--no-sandbox"])
             page = browser.new_page()
-            page.goto(f"{url}contact")
+            page.goto(_address(url, "contact"))
             _solved(page)
             yield "| wall-clock time [s] | median | 95 % | longest |"
             yield "|---|---|---|---|"
@@ -167,7 +172,7 @@ def lines(*, fast: bool) -> Iterator[str]:
             for _ in range(3 if fast else 8):
                 began = time.perf_counter()
                 visit = browser.new_page()
-                visit.goto(f"{url}contact")
+                visit.goto(_address(url, "contact"))
                 visit.get_by_role("textbox", name="Load, F").wait_for()
                 contents.append(time.perf_counter() - began)
                 _solved(visit)
@@ -176,7 +181,7 @@ def lines(*, fast: bool) -> Iterator[str]:
             yield _row("first content: settings and progress", contents)
             yield _row("first contact: solved, all figures drawn", wholes)
             for cells in (128, 256):
-                page.goto(f"{url}contact?grid.cells={cells}+x+{cells}")
+                page.goto(_address(url, "contact", f"&grid.cells={cells}+x+{cells}"))
                 _solved(page)
                 before = _spent(process)
                 first, whole = _steps(page, steps, cells)
@@ -211,7 +216,7 @@ def _crowd(browser: Any, url: str, count: int) -> list[float]:
     """Return the seconds of every step with several users at once."""
     pages = [browser.new_context().new_page() for _ in range(USERS)]
     for page in pages:
-        page.goto(f"{url}contact")
+        page.goto(_address(url, "contact"))
         _solved(page)
     rng, seconds = random.Random(3), []
     for _ in range(count):
@@ -227,7 +232,7 @@ def _drop(browser: Any, url: str, folder: Path, size: int) -> float:
     """Return the seconds from the upload of a large recording to its verdict."""
     np.save(folder / "long.npy", np.random.default_rng(0).standard_normal(size))
     page = browser.new_page()
-    page.goto(f"{url}recordings")
+    page.goto(_address(url, "recordings"))
     for name, text in (("Sampling rate", "50 kHz"), ("Unit of the values", "m/s^2")):
         box = page.get_by_role("textbox", name=re.compile(f"^{name}"))
         box.fill(text)

@@ -315,7 +315,7 @@ def test_an_address_only_sets_values(visit, server):
 @pytest.mark.parametrize("header", HOSTILE_HEADERS, ids=lambda header: next(iter(header)))
 def test_a_header_does_not_appear_in_the_page(server, header):
     connection = http.client.HTTPConnection(server.host)
-    connection.request("GET", "/contact", headers=header)
+    connection.request("GET", "/contact", headers={**server.cookie, **header})
     reply = connection.getresponse()
     response = f"{reply.getheaders()} {reply.read().decode('utf-8')}"
     assert reply.status in (200, 400, 403)
@@ -331,6 +331,7 @@ def handshake(server, origin):
         "Connection": "Upgrade",
         "Sec-WebSocket-Version": "13",
         "Origin": origin,
+        **server.cookie,
     }
     connection.request(
         "GET", "/contact/ws", headers={**upgrade, "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ=="}
@@ -349,7 +350,7 @@ def test_a_foreign_origin_gets_403(server, origin):
 
 def test_the_first_address_opens_the_contact(server):
     connection = http.client.HTTPConnection(server.host)
-    connection.request("GET", "/")
+    connection.request("GET", "/", headers=server.cookie)
     answer = connection.getresponse()
     assert (answer.status, answer.getheader("Location")) == (302, "/contact")
     connection.close()

@@ -81,7 +81,7 @@ def test_the_first_numbers_are_there_within_a_second_although_nothing_is_compile
 
 def test_the_numbers_are_in_the_page_itself(server):
     connection = http.client.HTTPConnection(server.host)
-    connection.request("GET", "/contact")
+    connection.request("GET", "/contact", headers=server.cookie)
     text = connection.getresponse().read().decode("utf-8")
     connection.close()
     head = text[: text.index("<script ")]  # what the browser shows before it loads a script

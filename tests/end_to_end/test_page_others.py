@@ -1,6 +1,5 @@
 """The pages of recordings, studies and histories in a browser, and the password of --listen."""
 
-import http.client
 import json
 import os
 import re
@@ -142,25 +141,15 @@ def test_a_history_is_animated(browser, tmp_path):
 
 def test_remote_users_need_the_password(browser, tmp_path):
     with serving(tmp_path, "--listen", "0.0.0.0", ASPERITY_PAGE_PASSWORD="long enough") as server:
-        connection = http.client.HTTPConnection(server.host)
-        connection.request("GET", "/contact")
-        answer = connection.getresponse()
-        body = answer.read()
-        assert (answer.status, answer.getheader("Location", "").split("?")[0].lstrip(".")) == (
-            302,
-            "/login",
-        )
-        assert b"Bokeh" not in body
-        connection.close()
-        visit = Visit(browser, server)
+        visit = Visit(browser, server, admitted=False)
         page = visit.page
         page.goto(f"http://{server.host}/contact")
-        assert page.url.split("?")[0].endswith("/login")
+        assert page.url == f"http://{server.host}/login"
         page.locator("input[type=password]").fill("wrong one")
         page.keyboard.press("Enter")
         page.get_by_text("Wrong password.").wait_for()
+        assert visit.errors.pop().endswith("403 (Forbidden)")
         assert page.get_by_role("textbox", name="Load, F").count() == 0
-        page.goto(f"http://{server.host}/contact")
         page.locator("input[type=password]").fill("long enough")
         page.keyboard.press("Enter")
         page.get_by_role("textbox", name="Load, F").wait_for()

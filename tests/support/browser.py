@@ -41,16 +41,21 @@ class Server:
                 env={**os.environ, **environment},
             )
         first_line = self.process.stdout.readline()
-        found = re.search(r"http://\S+/", first_line)
+        found = re.search(r"(http://\S+/)\?token=(\S+)", first_line)
         if not found:
             self.process.kill()
             self.process.communicate()
         assert found, f"{first_line}{self.log.read_text('utf-8')}"
-        self.url = found[0]
+        self.url, self.token = found.groups()
 
     @property
     def host(self) -> str:
-        return urlsplit(self.url).netloc.replace("0.0.0.0", "127.0.0.1")
+        return urlsplit(self.url).netloc
+
+    @property
+    def cookie(self) -> dict[str, str]:
+        """Header of a visitor who was admitted."""
+        return {"Cookie": f"asperity-{self.host.rpartition(':')[2]}={self.token}"}
 
     def stop(self) -> str:
         """Stop the server with SIGINT, as Ctrl-C does; return its log."""
@@ -104,11 +109,15 @@ def expect(locator):
 class Visit:
     """A page in the browser, its requests to other hosts, and its errors."""
 
-    def __init__(self, browser, server: Server, **settings) -> None:
+    def __init__(self, browser, server: Server, *, admitted: bool = True, **settings) -> None:
         self.server, self.foreign, self.errors = server, [], []
         self.context = browser.new_context(
             **{"viewport": {"width": 1280, "height": 1000}, **settings}
         )
+        if admitted:
+            name, _, value = server.cookie["Cookie"].partition("=")
+            cookie = {"name": name, "value": value, "url": server.url, "sameSite": "Strict"}
+            self.context.add_cookies([cookie])
         self.context.route(re.compile(".*"), self._filter_request)
         self.page = self.context.new_page()
         self.page.set_default_timeout(TIMEOUT_MS)

@@ -10,7 +10,7 @@ import pytest
 
 from asperity.app import contact_jobs as work
 from asperity.app.contact_jobs import JobFailure, Superseded, Ticket, run_job
-from asperity.app.jobs import JobQueue, WorkerPool, job_outcome, wait_until_warm
+from asperity.app.jobs import JobQueue, VisitPool, WorkerPool, job_outcome, wait_until_warm
 from asperity.core.errors import BadInput
 from asperity.paper import papers_case
 
@@ -91,6 +91,24 @@ def test_a_closed_session_frees_its_slot_and_receives_nothing_more():
     assert results == []
     assert len(workshop.submitted) == 1
     assert JobQueue(workshop, run_immediately)._slot == 0
+
+
+def test_the_jobs_of_a_visit_wait_until_its_browser_is_connected():
+    workshop, results = ManualWorkshop(), []
+    workshop.submit_solve, workshop.when_warm = workshop.submit, run_immediately
+    visit = VisitPool(workshop)
+    queues = [JobQueue(visit, run_immediately, solves=solves) for solves in (False, True)]
+    for line in queues:
+        line.submit((str, ()), results.append)
+    assert workshop.submitted == []
+    assert all(line.busy for line in queues)
+    visit.connect()
+    assert len(workshop.submitted) == 2
+    workshop.submitted[0][2].set_result("a")
+    workshop.submitted[1][2].set_exception(ValueError())
+    assert results[0] == "a"
+    queues[0].submit((str, ()), results.append)
+    assert len(workshop.submitted) == 3
 
 
 def test_without_a_free_slot_jobs_still_run():

@@ -193,7 +193,7 @@ def test_open_release_metadata_are_detected_and_listed():
 
 
 def name_and_bound(requirement: str) -> tuple[str, str]:
-    name, bound = re.fullmatch(r"([\w-]+) ?(>=[\d.]+)", requirement).groups()
+    name, bound = re.fullmatch(r"([\w-]+) ?(>=[\d.]+(?:,<[\d.]+)?)", requirement).groups()
     return name, bound
 
 

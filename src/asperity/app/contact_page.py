@@ -18,7 +18,7 @@ from asperity.app.contact_jobs import (
 from asperity.app.contact_result import ContactResult
 from asperity.app.contact_tools import Sound, link_button, picture_button
 from asperity.app.figures import SPECTRUM_HEIGHT, TRIALS_HEIGHT, SpectrumFigure, TrialFigures
-from asperity.app.jobs import JobQueue, WorkerPool
+from asperity.app.jobs import JobQueue, VisitPool
 from asperity.app.machine_drawing import MachineDrawing
 from asperity.app.map_images import MapImages, placeholder
 from asperity.app.presets import TITLES, preset_case
@@ -83,7 +83,7 @@ class ContactView:
     def __init__(
         self,
         settings: Settings,
-        worker_pool: WorkerPool,
+        worker_pool: VisitPool,
         deliver: Callable[[Callable[[], None]], None],
         set_address: Callable[[str], None],
         tools: ReportTools,

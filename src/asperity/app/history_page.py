@@ -8,7 +8,7 @@ from bokeh.models import Column, ColumnDataSource, Range1d, Slider, Span
 from asperity.app.contact_jobs import JobFailure
 from asperity.app.figures import BLUE, VERMILION, plain_figure, to_display
 from asperity.app.folder_jobs import HistoryData, open_history
-from asperity.app.jobs import JobQueue, WorkerPool
+from asperity.app.jobs import JobQueue, VisitPool
 from asperity.app.map_images import MapImages
 from asperity.app.widgets import BAR, LOOK, Layout, PageBlock, button, notes, sentences, text_block
 from asperity.core.quantities import quantity
@@ -18,7 +18,7 @@ class HistoryView:
     """History of one visitor with its widgets."""
 
     def __init__(
-        self, folder: Path, worker_pool: WorkerPool, deliver: Callable[[Callable[[], None]], None]
+        self, folder: Path, worker_pool: VisitPool, deliver: Callable[[Callable[[], None]], None]
     ) -> None:
         self._folder = folder
         self._queue = JobQueue(worker_pool, deliver)

@@ -120,6 +120,56 @@ class WorkerPool:
         self._pool.shutdown(wait=True, cancel_futures=True)
 
 
+class VisitPool:
+    """Worker pool of one visit, whose jobs wait until its browser is connected.
+
+    A request alone starts no work: any web site can make a browser send one.
+    """
+
+    def __init__(self, worker_pool: WorkerPool) -> None:
+        self._pool = worker_pool
+        self.newest, self.acquire_slot, self.release = (
+            worker_pool.newest,
+            worker_pool.acquire_slot,
+            worker_pool.release,
+        )
+        self.when_warm = worker_pool.when_warm
+        self._connected = False
+        self._waiting: list[tuple[Future[object], Callable[[], Future[object]]]] = []
+
+    @property
+    def is_compiling(self) -> bool:
+        """True while the first worker loads and compiles the solver."""
+        return self._pool.is_compiling
+
+    @property
+    def has_room(self) -> bool:
+        """True if a worker is idle, or will be once the solver is compiled."""
+        return self._pool.has_room
+
+    def submit(self, work: Callable[..., object], *arguments: object) -> "Future[object]":
+        """Run a job once the browser is connected; see `WorkerPool.submit`."""
+        return self._start(partial(self._pool.submit, work, *arguments))
+
+    def submit_solve(self, work: Callable[..., object], *arguments: object) -> "Future[object]":
+        """Run a job that needs the solver once the browser is connected."""
+        return self._start(partial(self._pool.submit_solve, work, *arguments))
+
+    def _start(self, submit: Callable[[], "Future[object]"]) -> "Future[object]":
+        if self._connected:
+            return submit()
+        outcome: Future[object] = Future()
+        self._waiting.append((outcome, submit))
+        return outcome
+
+    def connect(self) -> None:
+        """Start the waiting jobs, and others at once from now on."""
+        self._connected = True
+        waiting, self._waiting = self._waiting, []
+        for outcome, submit in waiting:
+            submit().add_done_callback(partial(_copy_outcome, outcome))
+
+
 def _copy_outcome(outcome: "Future[object]", done: "Future[object]") -> None:
     """Give a waiting job the outcome of its run."""
     error = done.exception()
@@ -141,7 +191,7 @@ class JobQueue:
 
     def __init__(
         self,
-        worker_pool: WorkerPool,
+        worker_pool: WorkerPool | VisitPool,
         deliver: Callable[[Callable[[], None]], None],
         *,
         solves: bool = False,

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from markupsafe import Markup
 
 from asperity.app.contact_jobs import Drawing, MachineDrawer, draw_machine
-from asperity.app.jobs import JobQueue, WorkerPool
+from asperity.app.jobs import JobQueue, VisitPool
 from asperity.app.widgets import DRAWING, text_block
 from asperity.case import MachineCase
 
@@ -15,7 +15,7 @@ class MachineDrawing:
 
     def __init__(
         self,
-        worker_pool: WorkerPool,
+        worker_pool: VisitPool,
         deliver: Callable[[Callable[[], None]], None],
         draw: MachineDrawer,
     ) -> None:

@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from asperity.app.contact_jobs import JobFailure
 from asperity.app.figures import BLUE, GREY, VERMILION, plain_figure
-from asperity.app.jobs import JobQueue, WorkerPool
+from asperity.app.jobs import JobQueue, VisitPool
 from asperity.app.recording_jobs import (
     RecordingContext,
     RecordingInputs,
@@ -58,7 +58,7 @@ class RecordingsView:
         self,
         folder: Path | None,
         context: RecordingContext,
-        worker_pool: WorkerPool,
+        worker_pool: VisitPool,
         deliver: Callable[[Callable[[], None]], None],
     ) -> None:
         self._folder, self._context = folder, context

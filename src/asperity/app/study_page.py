@@ -11,7 +11,7 @@ from asperity.app.contact_jobs import JobFailure
 from asperity.app.contact_result import ContactResult
 from asperity.app.figures import BLUE, VERMILION, plain_figure, to_display
 from asperity.app.folder_jobs import StudyData, open_study, solve_row
-from asperity.app.jobs import JobQueue, WorkerPool
+from asperity.app.jobs import JobQueue, VisitPool
 from asperity.app.map_images import MapImages
 from asperity.app.settings import Settings
 from asperity.app.widgets import (
@@ -40,7 +40,7 @@ class StudyView:
         self,
         folder: Path,
         case: Case,
-        worker_pool: WorkerPool,
+        worker_pool: VisitPool,
         deliver: Callable[[Callable[[], None]], None],
     ) -> None:
         self._folder, self._case = folder, case

@@ -87,6 +87,10 @@ class FileDrop(FileDropper):  # type: ignore[misc]
         except (KeyError, TypeError, ValueError, OverflowError):
             self._on_error("A chunk of the file was damaged. Drop the file again.")
             return
+        self._write(name, number, total, data)
+
+    def _write(self, name: str, number: int, total: int, data: bytes | memoryview) -> None:
+        """Append a chunk to its file, or refuse the file."""
         if number == 1:
             if name in self._open:
                 self._open.pop(name)[0].unlink(missing_ok=True)

@@ -14,7 +14,6 @@ import socket
 from collections import Counter
 from hmac import compare_digest
 from importlib.resources import files
-from typing import Any
 from urllib.parse import urlencode
 
 from tornado.httputil import HTTPHeaders, HTTPServerRequest
@@ -190,7 +189,7 @@ class _NotAdmitted(Matcher):  # type: ignore[misc]
     def __init__(self, policy: AccessPolicy) -> None:
         self._policy = policy
 
-    def match(self, request: HTTPServerRequest) -> dict[str, Any] | None:
+    def match(self, request: HTTPServerRequest) -> dict[str, object] | None:
         return None if self._policy.admits(request) else {}
 
 

@@ -20,7 +20,7 @@ from asperity.app import contact_page as contact
 from asperity.app import history_page as history
 from asperity.app import recordings_page as recordings
 from asperity.app import study_page as study
-from asperity.app.jobs import WorkerPool
+from asperity.app.jobs import VisitPool, WorkerPool
 from asperity.app.opening import OpenedPage
 from asperity.app.recording_jobs import RecordingContext
 from asperity.app.serving.access import (
@@ -92,14 +92,14 @@ class PageSite:
         """Create the page of a contact for one visit."""
         view = contact.ContactView(
             Settings(self.opened.case, preset=self.opened.preset),
-            self.worker_pool,
+            self._visit_pool(),
             _deliver(),
             _address(),
             self.tools,
             self.surfaces,
         )
         parts, sections = contact.layout(view)
-        _when_connected(partial(view.begin, _query(), self.opened.result))
+        view.begin(_query(), self.opened.result)
         _document().on_event("document_ready", lambda _event: view.create_next_figure())
         _document().add_timeout_callback(
             view.create_next_figure, READY_MS
@@ -114,30 +114,29 @@ class PageSite:
         context = RecordingContext(
             self.opened.case if self.opened.stated else None, self.opened.table
         )
-        view = recordings.RecordingsView(folder, context, self.worker_pool, _deliver())
+        view = recordings.RecordingsView(folder, context, self._visit_pool(), _deliver())
         panel.state.on_session_destroyed(lambda _context: view.close())
         if folder is not None:
-            add_check = partial(_document().add_periodic_callback, view.refresh, FOLDER_CHECK_MS)
-            _when_connected(add_check)
-            _when_connected(view.refresh)
+            _document().add_periodic_callback(view.refresh, FOLDER_CHECK_MS)
+            view.refresh()
         return self._page("recordings", "Recordings", *recordings.layout(view))
 
     def study(self) -> Any:
         """Create the page of a study for one visit."""
         assert self.opened.path is not None
         assert isinstance(self.opened.case, Case)
-        view = study.StudyView(self.opened.path, self.opened.case, self.worker_pool, _deliver())
+        view = study.StudyView(self.opened.path, self.opened.case, self._visit_pool(), _deliver())
         panel.state.on_session_destroyed(lambda _context: view.close())
-        _when_connected(view.begin)
+        view.begin()
         return self._page("study", "Study", *study.layout(view))
 
     def history(self) -> Any:
         """Create the page of a history for one visit."""
         assert self.opened.path is not None
-        view = history.HistoryView(self.opened.path, self.worker_pool, _deliver())
+        view = history.HistoryView(self.opened.path, self._visit_pool(), _deliver())
         panel.state.on_session_destroyed(lambda _context: view.close())
         _document().add_periodic_callback(view.advance, FRAME_MS)
-        _when_connected(view.begin)
+        view.begin()
         return self._page("history", "History", *history.layout(view))
 
     def pages(self) -> dict[str, Callable[[], Any]]:
@@ -149,6 +148,19 @@ class PageSite:
             "history": self.history,
         }
         return {name: creators[name] for name, _ in self.links}
+
+    def _visit_pool(self) -> VisitPool:
+        """Return the worker pool of the current visit, which starts when its browser connects."""
+        pool, document = VisitPool(self.worker_pool), _document()
+
+        def check() -> None:
+            session = document.session_context and document.session_context.session
+            if session and session.connection_count > 0:
+                document.remove_periodic_callback(periodic)
+                pool.connect()
+
+        periodic = document.add_periodic_callback(check, CONNECTION_CHECK_MS)
+        return pool
 
     def _page(
         self,
@@ -216,22 +228,6 @@ def _deliver() -> Callable[[Callable[[], None]], None]:
             document.add_next_tick_callback(function)
 
     return partial(loop.add_callback, add)
-
-
-def _when_connected(function: Callable[[], None]) -> None:
-    """Call a function once the browser of this visit is connected: a request alone starts no work.
-
-    Any web site can make a browser send requests, but connects only from a page of this server.
-    """
-    document = _document()
-
-    def check() -> None:
-        session = document.session_context and document.session_context.session
-        if session and session.connection_count > 0:
-            document.remove_periodic_callback(periodic)
-            function()
-
-    periodic = document.add_periodic_callback(check, CONNECTION_CHECK_MS)
 
 
 def _document() -> Any:
