@@ -80,7 +80,7 @@ class StoreOverview:
             raise BadInput(
                 f"a store is exported as .csv or .parquet, got {path.name}; change the suffix"
             )
-        with closing(Store(self.path, make=False)) as store:
+        with closing(Store(self.path, make=False, repair=False)) as store:
             table = _table(store)
         if path.suffix.lower() == ".csv":
             write_csv(path, table)
@@ -98,7 +98,7 @@ def store_overview(path: str | Path) -> StoreOverview:
     UnreadableFile
         if the file is not a store.
     """
-    with closing(Store(path, make=False)) as store:
+    with closing(Store(path, make=False, repair=False)) as store:
         rows = [_sensor_row(store, number, address) for number, address in store.sensors()]
     rows.sort(key=lambda row: SEVERITY.index(row["state"]))
     return StoreOverview(path=Path(path), rows=tuple(rows))
@@ -205,7 +205,7 @@ def acknowledge_in(store: str | Path, named: str) -> None:
     BadInput
         if the sensor does not exist, or has no judgement.
     """
-    with closing(Store(store, make=False)) as opened:
+    with closing(Store(store, make=False, repair=False)) as opened:
         addresses = {"/".join(address): address for _, address in opened.sensors()}
         if named not in addresses:
             raise BadInput(

@@ -6,85 +6,34 @@ All writing is transactional (write-ahead log): a watch may be killed at any mom
 
 import json
 import sqlite3
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
 from time import monotonic
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 from asperity.core.documents import JsonObject, Table
 from asperity.core.errors import AsperityError, BadInput, UnreadableFile
 from asperity.core.files import new_part, require_writable
+from asperity.monitoring.store.digests import add_function, damaged_rows, keep_digests
+from asperity.monitoring.store.repair import (
+    DamagedStore,
+    repair_rows,
+    require_intact,
+    set_aside,
+)
+from asperity.monitoring.store.schema import VERSION, Run, convert_tables, create_tables
 from asperity.trend import AlarmState
 
 STORE = "asperity.db"
-VERSION = (
-    4  # 1: no duration of recordings; 2: `learned` is a column of `sensor`; 3: no `gap`, `RENAMED`
-)
 BUSY_S = 30.0  # timeout while another process writes [s]
 MISSING_S = 60.0  # time after which a missing folder of the store is made again [s]
 REMEDY = "delete it, and its recordings are read again, or choose another store"
-LEARNED = "CREATE TABLE learned (sensor INTEGER PRIMARY KEY REFERENCES sensor, body BLOB NOT NULL)"
-LEVELS = "CREATE TABLE levels (sensor INTEGER PRIMARY KEY REFERENCES sensor, body TEXT NOT NULL)"
-# versions of files whose recordings were deleted, and the number deleted before a recording
-DROPPED = (
-    "CREATE TABLE dropped (sensor INTEGER NOT NULL REFERENCES sensor, file TEXT NOT NULL, "
-    "version TEXT NOT NULL, PRIMARY KEY (sensor, file, version)) WITHOUT ROWID"
-)
-GAP = "CREATE TABLE gap (recording INTEGER PRIMARY KEY REFERENCES recording, count INTEGER)"
-TREND = """CREATE VIEW trend AS
-    SELECT machine.name AS machine, point.name AS point, sensor.name AS sensor, recording.file,
-        recording.arrived, recording.started, recording.state, json_extract(row, '$.x') AS x,
-        json_extract(row, '$.crf_hz') AS crf_hz,
-        json_extract(row, '$.crf_std_hz') AS crf_std_hz, json_extract(row, '$.rms') AS rms,
-        json_extract(row, '$.kurtosis') AS kurtosis,
-        json_extract(row, '$.velocity_rms') AS velocity_rms, json_extract(row, '$.zone') AS zone,
-        json_extract(row, '$.reason') AS reason
-    FROM recording JOIN sensor ON sensor.id = recording.sensor JOIN point ON point.id = sensor.point
-        JOIN machine ON machine.id = point.machine"""
-RENAMED = (  # table, old and new name of a column
-    ("recording", "heard", "arrived"),
-    ("sensor", "asked", "question"),
-    ("sensor", "said", "content"),
-    ("call", "said", "content"),
-)
-SCHEMA = f"""
-CREATE TABLE machine (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE);
-CREATE TABLE point (
-    id INTEGER PRIMARY KEY, machine INTEGER NOT NULL REFERENCES machine, name TEXT NOT NULL,
-    UNIQUE (machine, name));
-CREATE TABLE sensor (
-    id INTEGER PRIMARY KEY, point INTEGER NOT NULL REFERENCES point, name TEXT NOT NULL,
-    settings TEXT NOT NULL, question TEXT, content TEXT, since INTEGER, UNIQUE (point, name));
-{LEARNED};
-{LEVELS};
-{DROPPED};
-{GAP};
-CREATE TABLE recording (
-    id INTEGER PRIMARY KEY, sensor INTEGER NOT NULL REFERENCES sensor, file TEXT NOT NULL,
-    version TEXT NOT NULL, arrived TEXT NOT NULL, started TEXT, duration REAL,
-    refused INTEGER NOT NULL, state TEXT, row TEXT, reading BLOB NOT NULL,
-    UNIQUE (sensor, file, version));
-CREATE TABLE judgement (
-    id INTEGER PRIMARY KEY, sensor INTEGER NOT NULL REFERENCES sensor, time TEXT NOT NULL,
-    state TEXT NOT NULL, since TEXT, reason TEXT, raised_by TEXT, false_alarm_rate REAL,
-    verdict TEXT, recordings INTEGER, new INTEGER);
-CREATE TABLE call (
-    id INTEGER PRIMARY KEY, sensor INTEGER NOT NULL REFERENCES sensor, who TEXT NOT NULL,
-    state TEXT NOT NULL, content TEXT NOT NULL, time TEXT NOT NULL,
-    attempts INTEGER NOT NULL DEFAULT 0, due REAL NOT NULL DEFAULT 0, failure TEXT, answered TEXT);
-CREATE INDEX calls ON call (sensor, who);
-CREATE INDEX judgements ON judgement (sensor, state);
-{TREND};
-"""
 
 
 class StoreUnavailable(AsperityError):
     """A store that cannot be used at present, such as on a full disk; a retry may succeed."""
-
-
-Run: TypeAlias = Callable[..., sqlite3.Cursor]  # runs a statement in a transaction
 
 
 class SensorAddress(NamedTuple):
@@ -132,14 +81,15 @@ class Store:
     """Store of recordings and judgements; created if the file does not exist.
 
     With `allow_unavailable`, a file that cannot be used at present is opened for reading only, or
-    replaced by an empty store in memory, until `recover` succeeds.
+    replaced by an empty store in memory, until `recover` succeeds. With `repair`, damaged rows are
+    removed, and a damaged file is set aside; `remarks` names them.
 
     Raises
     ------
     BadInput
         if the path is not writable.
     UnreadableFile
-        if the file is not a store, or of a later version.
+        if the file is not a store, of a later version, or damaged, unless `repair`.
     StoreUnavailable
         if the file cannot be used at present, unless `allow_unavailable`.
     """
@@ -151,9 +101,12 @@ class Store:
         make: bool = True,
         in_memory: bool = False,
         allow_unavailable: bool = False,
+        repair: bool = True,
     ) -> None:
         self.path = Path(path)
-        self._in_memory = in_memory
+        self._in_memory, self._repairs = in_memory, repair
+        self.remarks: list[str] = []
+        self.repairs = 0  # times that damaged rows were removed from the open file
         self._missing_since: float | None = None
         self._unavailable: StoreUnavailable | None = None  # until the file is opened for writing
         if not (in_memory or make or self.path.exists()):
@@ -178,6 +131,13 @@ class Store:
             self._connection = sqlite3.connect(location, timeout=BUSY_S, isolation_level=None)
             try:
                 self._prepare()
+            except DamagedStore as error:
+                self._connection.close()
+                if not self._repairs:
+                    raise sqlite3.DatabaseError(str(error)) from error
+                self.remarks.append(set_aside(self.path, str(error)))
+                self._connection = sqlite3.connect(location, timeout=BUSY_S, isolation_level=None)
+                self._prepare()
             except BaseException:
                 self._connection.close()
                 raise
@@ -185,7 +145,8 @@ class Store:
         self._unavailable = None
 
     def _prepare(self) -> None:
-        """Create the tables of a new file, or convert an older version."""
+        """Create the tables of a new file, or convert an older version; repair damaged rows."""
+        add_function(self._connection)
         version = self._connection.execute("PRAGMA user_version").fetchone()[0]
         if version == 0:
             self._connection.execute("PRAGMA auto_vacuum = INCREMENTAL")
@@ -193,13 +154,45 @@ class Store:
         self._connection.execute("PRAGMA foreign_keys = ON")
         if version == 0:
             self._create()
-        elif version in (1, 2, 3):
-            self._migrate()
+        elif version in range(1, VERSION):
+            with self.transaction() as run:
+                convert_tables(run)
         elif version != VERSION:
             raise UnreadableFile(
                 f"{self.path} is a store of version {version}, this asperity writes {VERSION}; "
                 "update asperity, or choose another store"
             )
+        require_intact(self._connection)
+        keep_digests(self._connection)
+        self._version_checked: int | None = None
+        self.check_rows()
+
+    def take_remarks(self) -> list[str]:
+        """Return what has been repaired since the last call."""
+        remarks, self.remarks = self.remarks, []
+        return remarks
+
+    def check_rows(self) -> None:
+        """Remove damaged rows if another program has written since, and count it in `repairs`.
+
+        Raises
+        ------
+        UnreadableFile
+            if there are and the store is not to be repaired.
+        """
+        ((version,),) = self.read("PRAGMA data_version")
+        if version == self._version_checked:
+            return
+        with self._translated_errors():
+            damaged = any(damaged_rows(self._connection))
+        if damaged:
+            with self.transaction():
+                remarks = repair_rows(self._connection, str(self.path))
+                if not self._repairs:
+                    raise UnreadableFile(f"{'; '.join(remarks)}; run the watch, which repairs it")
+            self.remarks += remarks
+            self.repairs += 1
+        self._version_checked = version
 
     def _open_provisionally(self, error: StoreUnavailable) -> None:
         """Read the file without writing, or use an empty store in memory."""
@@ -211,13 +204,16 @@ class Store:
         try:
             with self._translated_errors():
                 self._connection = sqlite3.connect(location, uri=True, isolation_level=None)
+                add_function(self._connection)
                 ((version,),) = self._connection.execute("PRAGMA user_version").fetchall()
-            if version == VERSION:
+                intact = version == VERSION and not any(damaged_rows(self._connection))
+            if intact:
                 return
             self._connection.close()
         except (StoreUnavailable, UnreadableFile):
             pass
         self._connection = sqlite3.connect(":memory:", isolation_level=None)
+        add_function(self._connection)
         self._create()
 
     def close(self) -> None:
@@ -281,32 +277,7 @@ class Store:
                 raise UnreadableFile(
                     f"{self.path} is a database of another program; choose another store"
                 )
-            for statement in SCHEMA.split(";\n"):
-                run(statement)
-            run(f"PRAGMA user_version = {VERSION}")
-
-    def _migrate(self) -> None:
-        """Convert a store of an older version."""
-        with self.transaction() as run:
-            if run("PRAGMA user_version").fetchone()[0] == 1:
-                run("ALTER TABLE recording ADD COLUMN duration REAL")
-                run("UPDATE recording SET duration = json_extract(row, '$.duration_s')")
-                run("PRAGMA user_version = 2")
-            if run("PRAGMA user_version").fetchone()[0] == 2:  # not done by another process
-                run(LEARNED)
-                run("INSERT INTO learned SELECT id, learned FROM sensor WHERE learned IS NOT NULL")
-                # the column stays: not every SQLite can drop columns
-                run("UPDATE sensor SET learned = NULL")
-                run("PRAGMA user_version = 3")
-            if run("PRAGMA user_version").fetchone()[0] == 3:
-                run(LEVELS)
-                run(DROPPED)
-                run(GAP)
-                run("DROP VIEW trend")
-                for table, old, new in RENAMED:
-                    run(f"ALTER TABLE {table} RENAME COLUMN {old} TO {new}")
-                run(TREND)
-                run("PRAGMA user_version = 4")
+            create_tables(run)
 
     @contextmanager
     def _translated_errors(self) -> Iterator[None]:

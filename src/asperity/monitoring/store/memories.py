@@ -8,7 +8,8 @@ from asperity.monitoring.series_state import (
     pack_shared,
     unpack_shared,
 )
-from asperity.monitoring.store.database import Run, Store
+from asperity.monitoring.store.database import Store
+from asperity.monitoring.store.schema import Run
 from asperity.monitoring.track_result import Track
 
 
@@ -30,7 +31,10 @@ def write_memory(run: Run, sensor: int, memory: SeriesMemory | None) -> None:
     if memory.since == 0:
         run("DELETE FROM learned WHERE sensor = ?", (sensor,))
         if not memory.moved:  # otherwise it covers only a part, and all is separated again
-            run("INSERT INTO learned VALUES (?, ?)", (sensor, pack_shared(memory.shared)))
+            run(
+                "INSERT INTO learned (sensor, body) VALUES (?, ?)",
+                (sensor, pack_shared(memory.shared)),
+            )
 
 
 def read_levels(store: Store, sensor: int) -> StoredLevels | None:
@@ -45,4 +49,7 @@ def write_levels(run: Run, sensor: int, track: Track) -> None:
     run("DELETE FROM levels WHERE sensor = ?", (sensor,))
     if judged and monitors:
         stored = StoredLevels(track.recordings[judged - 1].file, monitors)
-        run("INSERT INTO levels VALUES (?, ?)", (sensor, json.dumps(stored._asdict())))
+        run(
+            "INSERT INTO levels (sensor, body) VALUES (?, ?)",
+            (sensor, json.dumps(stored._asdict())),
+        )

@@ -5,7 +5,8 @@ from copy import copy
 from functools import partial
 from pathlib import Path
 
-from asperity.monitoring.store.database import Run, Store
+from asperity.monitoring.store.database import Store
+from asperity.monitoring.store.schema import Run
 from asperity.monitoring.store.sensor import Sensor
 from asperity.monitoring.store.sensors import Sensors
 
@@ -86,10 +87,10 @@ class MemoryCopy:
         run("DELETE FROM learned WHERE sensor = ?", (number,))
         learned = memory.read("SELECT body FROM learned WHERE sensor = ?", sensor.number)
         for (body,) in learned:
-            run("INSERT INTO learned VALUES (?, ?)", (number, body))
+            run("INSERT INTO learned (sensor, body) VALUES (?, ?)", (number, body))
         run("DELETE FROM levels WHERE sensor = ?", (number,))
         for (body,) in memory.read("SELECT body FROM levels WHERE sensor = ?", sensor.number):
-            run("INSERT INTO levels VALUES (?, ?)", (number, body))
+            run("INSERT INTO levels (sensor, body) VALUES (?, ?)", (number, body))
 
     def _add_rows(self, run: Run, sensor: Sensor, number: int, tables: Sequence[str]) -> None:
         """Add new rows of a sensor in some tables, and attempts to notify."""

@@ -6,7 +6,8 @@ from typing import Any, NamedTuple, cast
 from uuid import uuid4
 
 from asperity.core.documents import JsonObject
-from asperity.monitoring.store.database import Run, SensorAddress, Store
+from asperity.monitoring.store.database import SensorAddress, Store
+from asperity.monitoring.store.schema import Run
 from asperity.monitoring.store.sensor import now
 from asperity.trend import ALARM_STATES
 

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-from asperity.monitoring.store.database import FileVersion, Run
+from asperity.monitoring.store.database import FileVersion
+from asperity.monitoring.store.schema import Run
 from asperity.monitoring.store.sensor import ACKNOWLEDGED, Sensor
 from asperity.monitoring.store.sensors import Sensors
 
@@ -123,7 +124,7 @@ def _delete_recordings(
             gap += recording.gap + (not recording.refused)
         elif gap:
             run(
-                "INSERT OR REPLACE INTO gap VALUES (?, ?)",
+                "INSERT OR REPLACE INTO gap (recording, count) VALUES (?, ?)",
                 (recording.number, recording.gap + gap),
             )
             sensor.recordings[key] = recording._replace(gap=recording.gap + gap)

@@ -8,6 +8,7 @@ from collections.abc import Collection
 from dataclasses import replace
 from datetime import UTC, datetime
 from math import nan
+from pathlib import Path
 
 import numpy as np
 
@@ -16,12 +17,12 @@ from asperity.core.errors import BadInput, UnreadableFile
 from asperity.monitoring.reading import Reading, pack_reading, unpack_reading
 from asperity.monitoring.store.database import (
     FileVersion,
-    Run,
     SensorAddress,
     StandingAlarm,
     Store,
     StoredRecording,
 )
+from asperity.monitoring.store.schema import Run
 from asperity.trend import AlarmState
 
 ACKNOWLEDGED = "acknowledged"  # state of a judgement that a person has made
@@ -163,6 +164,10 @@ class Sensor:
         try:
             return _in_double_precision(unpack_reading(body, f"a recording in {self.store.path}"))
         except UnreadableFile:
+            self.store.remarks.append(
+                f"{self.store.path} was damaged: recording {Path(key.file).name}; read again if "
+                "the file is still there"
+            )
             with self.store.transaction() as run:
                 run("DELETE FROM recording WHERE id = ?", (self.recordings.pop(key).number,))
             self.unjudged.discard(key)
@@ -186,7 +191,10 @@ class Sensor:
         self.dropped.add(key)
         run("DELETE FROM gap WHERE recording = ?", (number,))
         run("DELETE FROM recording WHERE id = ?", (number,))
-        run("INSERT OR IGNORE INTO dropped VALUES (?, ?, ?)", (self.number, *key))
+        run(
+            "INSERT OR IGNORE INTO dropped (sensor, file, version) VALUES (?, ?, ?)",
+            (self.number, *key),
+        )
 
     def forget_dropped(self, run: Run, present: Collection[str]) -> None:
         """Forget deleted recordings whose files are not in the folder any more."""

@@ -17,7 +17,6 @@ from asperity.monitoring.series_state import SeriesMemory, StoredLevels
 from asperity.monitoring.states import SILENCE
 from asperity.monitoring.store.database import (
     FileVersion,
-    Run,
     SensorAddress,
     StandingAlarm,
     Store,
@@ -35,6 +34,7 @@ from asperity.monitoring.store.notification_queue import (
     notification_content,
 )
 from asperity.monitoring.store.recording_rows import StoredRow, stored_rows
+from asperity.monitoring.store.schema import Run
 from asperity.monitoring.store.sensor import ACKNOWLEDGED, TOGETHER, Sensor
 from asperity.monitoring.track_result import Track
 from asperity.trend import AlarmState

@@ -50,6 +50,7 @@ class FolderWatch:
         self.progress, self.reopen = progress, reopen
         self.troubles = state.troubles
         self._copy: MemoryCopy | None = None
+        self._repairs = store.repairs
         if state.sensors.store is not store:
             self._continue_in_memory()
         self._lost = folder  # the folder, or the first of its ancestors that was missing
@@ -88,7 +89,7 @@ class FolderWatch:
             self._record_failure(error)
         else:
             self._record_success()
-        sentences = self.troubles.take()
+        sentences = (*self.store.take_remarks(), *self.troubles.take())
         if update is None:
             return Update(new=(), track=None, failed=sentences, notice=True) if sentences else None
         failed = (*update.failed, *sentences)
@@ -143,6 +144,9 @@ class FolderWatch:
         """Return from a copy in memory to the store, as soon as it can be written."""
         if self._copy is None:
             self.store.require_present()
+            self.store.check_rows()
+            if self.store.repairs != self._repairs:
+                self._reopen()
             return
         try:
             self._merge_copy()
@@ -158,10 +162,17 @@ class FolderWatch:
             return
         self.store.recover()
         self._copy.merge(self.store)
+        memory = self.state.sensors.store
+        self._reopen()
+        memory.close()
+        self._copy = None
+
+    def _reopen(self) -> None:
+        """Read the sensors of the store again; they are judged again."""
         sensors = self.reopen(self.store)
         sensors.notifications.notify_states = self.state.sensors.notifications.notify_states
-        self.state.sensors.store.close()
-        self.state.sensors, self._copy = sensors, None
+        self.state.release()
+        self.state.sensors, self._repairs, self._unjudged = sensors, self.store.repairs, True
 
     def _state_unavailable(self, error: Exception) -> None:
         """State, once, that the store cannot be used."""

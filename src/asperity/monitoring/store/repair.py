@@ -1,0 +1,154 @@
+"""Repair of a store: damaged rows are removed and named, a damaged file is set aside."""
+
+import sqlite3
+from collections.abc import Sequence
+from contextlib import suppress
+from datetime import UTC, datetime
+from pathlib import Path
+
+from asperity.monitoring.store.digests import GROUPS, Group, damaged_rows
+
+NAMED = 5  # damaged recordings that are named
+SIDE_FILES = ("", "-wal", "-shm")  # endings of the files of one SQLite database
+OF_SENSOR = ("learned", "levels", "dropped", "recording", "judgement", "call")
+BY_DIGEST = {(group.table, group.digest): group for group in GROUPS}
+
+
+class DamagedStore(Exception):
+    """A file whose structure is damaged."""
+
+
+def require_intact(connection: sqlite3.Connection) -> None:
+    """Raise DamagedStore if the structure of a store's file is damaged.
+
+    Raises
+    ------
+    sqlite3.DatabaseError
+        if it cannot be told to be a store.
+    """
+    names = connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'").fetchall()
+    if not {group.table for group in GROUPS} <= {name for (name,) in names}:
+        raise sqlite3.DatabaseError("tables are missing")
+    try:
+        ((result, *_),) = connection.execute("PRAGMA integrity_check(1)").fetchall()
+    except sqlite3.OperationalError:
+        raise
+    except sqlite3.DatabaseError as error:
+        raise DamagedStore(str(error)) from error
+    if result != "ok":
+        raise DamagedStore(" ".join(str(result).split()))
+
+
+def set_aside(path: Path, reason: str) -> str:
+    """Rename a damaged store with its side files; return a sentence on it."""
+    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S%f")
+    kept = path.with_name(f"{path.stem}-damaged-{stamp}{path.suffix}")
+    for ending in SIDE_FILES:
+        with suppress(FileNotFoundError):
+            path.with_name(path.name + ending).rename(kept.with_name(kept.name + ending))
+    return (
+        f"{path} was damaged ({reason}); it is kept as {kept.name}, and recordings are read again "
+        "into a new store, without the former acknowledgements"
+    )
+
+
+def repair_rows(connection: sqlite3.Connection, name: str) -> list[str]:
+    """Remove the rows that do not match their digest; return a sentence on each kind.
+
+    Removed recordings are read again from their files, and judged again. Runs in a transaction of
+    the caller.
+    """
+    groups = {(row.group.table, row.group.digest) for row in damaged_rows(connection)}
+    if not groups:
+        return []
+    former = connection.text_factory
+    connection.text_factory = lambda text: text.decode(errors="replace")
+    try:
+        sentences = _repair_sensors(connection)
+        for key in sorted(groups):
+            sentences += _repair_group(connection, BY_DIGEST[key])
+        for table in OF_SENSOR:
+            connection.execute(f"DELETE FROM {table} WHERE sensor NOT IN (SELECT id FROM sensor)")
+    finally:
+        connection.text_factory = former
+    return [f"{name} was damaged: {sentence}" for sentence in sentences]
+
+
+def _damaged(group: Group) -> str:
+    """Return the condition for damaged rows."""
+    return f"{group.digest} IS NOT {group.value}"
+
+
+def _repair_sensors(connection: sqlite3.Connection) -> list[str]:
+    """Remove sensors whose names or settings are damaged, with all that belongs to them."""
+    machine, point, sensor = (BY_DIGEST[name, "digest"] for name in ("machine", "point", "sensor"))
+    points = (
+        f"SELECT id FROM point WHERE {_damaged(point)} OR machine NOT IN (SELECT id FROM machine) "
+        f"OR machine IN (SELECT id FROM machine WHERE {_damaged(machine)})"
+    )
+    removed = connection.execute(
+        f"SELECT id, name FROM sensor WHERE {_damaged(sensor)} OR point NOT IN "
+        f"(SELECT id FROM point) OR point IN ({points})"
+    ).fetchall()
+    for number, _ in removed:
+        connection.execute(
+            "DELETE FROM gap WHERE recording IN (SELECT id FROM recording WHERE sensor = ?)",
+            (number,),
+        )
+        for table in OF_SENSOR:
+            connection.execute(f"DELETE FROM {table} WHERE sensor = ?", (number,))
+        connection.execute("DELETE FROM sensor WHERE id = ?", (number,))
+    connection.execute(f"DELETE FROM point WHERE id IN ({points})")
+    connection.execute(f"DELETE FROM machine WHERE {_damaged(machine)}")
+    if not removed:
+        return []
+    return [
+        f"names or settings of {_listed([name for _, name in removed], 'sensor')}; its recordings "
+        "are read again, without the former acknowledgements"
+    ]
+
+
+def _repair_group(connection: sqlite3.Connection, group: Group) -> list[str]:
+    """Remove the damaged rows of one table, and what was derived from them."""
+    table, condition = group.table, _damaged(group)
+    if table in ("machine", "point") or (table, group.digest) == ("sensor", "digest"):
+        return []  # removed with their sensors
+    if table == "sensor":
+        connection.execute(
+            f"DELETE FROM learned WHERE sensor IN (SELECT id FROM sensor WHERE {condition})"
+        )
+        connection.execute(
+            f"UPDATE sensor SET question = NULL, content = NULL, since = NULL WHERE {condition}"
+        )
+        return ["the last judgement of a sensor; it is made again"]
+    column = "file" if table == "recording" else group.key[0]
+    rows = connection.execute(f"SELECT {column} FROM {table} WHERE {condition}").fetchall()
+    if not rows:
+        return []  # of a removed sensor
+    if table == "recording":
+        connection.execute(
+            f"DELETE FROM gap WHERE recording IN (SELECT id FROM recording WHERE {condition})"
+        )
+    # judged again, whatever was removed
+    connection.execute("UPDATE sensor SET question = NULL")
+    connection.execute(f"DELETE FROM {table} WHERE {condition}")
+    if table == "recording":
+        files = [Path(str(file)).name for (file,) in rows]
+        return [f"{_listed(files, 'recording')}; read again if the file is still there"]
+    return [f"{len(rows)} {EFFECTS[table]}"]
+
+
+EFFECTS = {
+    "learned": "memory of spectra; it is made again",
+    "levels": "memory of levels; it is made again",
+    "dropped": "mark of a deleted recording; its file is read again if it is still there",
+    "gap": "count of deleted recordings",
+    "judgement": "earlier judgement, removed; check that its alarm is acknowledged",
+    "call": "notification, removed; the state is notified again",
+}
+
+
+def _listed(names: Sequence[str], noun: str) -> str:
+    """Return the first names of a list in words."""
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return f"{noun}{'s' if len(names) > 1 else ''} {', '.join(names[:NAMED])}{more}"
