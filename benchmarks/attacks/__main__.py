@@ -100,6 +100,7 @@ KINDS = {
     "--set values": Kind(300, in_worker),
     "damaged results": Kind(1500, in_worker),
     "recordings and surfaces": Kind(2000, in_worker),
+    "stores": Kind(1000, in_worker),
     "hostile files": Kind(len(HOSTILE), hostile),
     "kills": Kind(60, endings.kills),
     "disk full": Kind(20, endings.full_disks),

@@ -9,13 +9,14 @@ import time
 from pathlib import Path
 
 from asperity.core.errors import BadInput
-from benchmarks.attacks import damage, inputs, names, runner
+from benchmarks.attacks import damage, inputs, names, runner, stores
 
 KINDS = {
     "case files": inputs.cases,
     "--set values": inputs.settings,
     "damaged results": damage.results,
     "recordings and surfaces": damage.measured,
+    "stores": stores.damaged_stores,
     "injections": names.injections,
 }
 

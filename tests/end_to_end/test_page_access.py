@@ -147,7 +147,7 @@ def test_every_response_forbids_frames_and_other_origins(server, remote):
     for _, headers, _ in answers:
         assert headers["Content-Security-Policy"] == "frame-ancestors 'none'"
         assert headers["X-Frame-Options"] == "DENY"
-        assert headers["Referrer-Policy"] == "no-referrer"
+        assert headers["Referrer-Policy"] == "same-origin"
         assert headers["X-Content-Type-Options"] == "nosniff"
         assert "Access-Control-Allow-Origin" not in headers
 

@@ -109,11 +109,10 @@ def test_old_recordings_are_thinned_out_and_the_judgement_remains(tmp_path, ever
 def test_deleted_recordings_count_as_positions_and_are_not_read_again(tmp_path):
     snapshots(tmp_path / "in", np.ones(60), every=None)
     look(tmp_path)
-    with closing(sqlite3.connect(tmp_path / "store.db")) as connection:
+    with closing(Store(tmp_path / "store.db")) as store, store.transaction() as run:
         for number in range(60):  # as if one had arrived per hour
             time = (START + timedelta(hours=number)).isoformat()
-            connection.execute("UPDATE recording SET arrived = ? WHERE id = ?", (time, number + 1))
-        connection.commit()
+            run("UPDATE recording SET arrived = ? WHERE id = ?", (time, number + 1))
     before = look(tmp_path)
     after = look(tmp_path, keep_s=86400.0)
     again = look(tmp_path, keep_s=86400.0)

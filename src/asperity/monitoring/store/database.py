@@ -289,8 +289,9 @@ class Store:
                 f"{self.path} cannot be used: {reason}; release it or free disk space, and retry"
             ) from error
         except sqlite3.DatabaseError as error:
+            reason = " ".join(str(error).split())[:120]
             raise UnreadableFile(
-                f"{self.path} is not a store of asperity, or damaged ({error}); {REMEDY}"
+                f"{self.path} is not a store of asperity, or damaged ({reason}); {REMEDY}"
             ) from None
 
     @contextmanager

@@ -9,6 +9,7 @@ from pathlib import Path
 from asperity.monitoring.store.digests import GROUPS, Group, damaged_rows
 
 NAMED = 5  # damaged recordings that are named
+LONGEST = 60  # characters of a name that are printed
 SIDE_FILES = ("", "-wal", "-shm")  # endings of the files of one SQLite database
 OF_SENSOR = ("learned", "levels", "dropped", "recording", "judgement", "call")
 BY_DIGEST = {(group.table, group.digest): group for group in GROUPS}
@@ -148,7 +149,8 @@ EFFECTS = {
 }
 
 
-def _listed(names: Sequence[str], noun: str) -> str:
+def _listed(names: Sequence[object], noun: str) -> str:
     """Return the first names of a list in words."""
     more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-    return f"{noun}{'s' if len(names) > 1 else ''} {', '.join(names[:NAMED])}{more}"
+    first = ", ".join(str(name)[-LONGEST:] for name in names[:NAMED])
+    return f"{noun}{'s' if len(names) > 1 else ''} {first}{more}"
