@@ -7,15 +7,21 @@ metadata, JSON files under a key. Errors distinguish a damaged file from one wit
 import hashlib
 import json
 import os
-from collections.abc import Mapping
+import zipfile
+from collections.abc import Collection, Mapping
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
 
 import asperity
 from asperity.core.documents import Table
 from asperity.core.errors import BadInput, UnreadableFile
 from asperity.core.files import require_file, write_bytes, write_text
+from asperity.core.limits import GIGABYTE, require_plausible_size, unpacked_limit
+from asperity.core.sandbox import read_in_subprocess
 from asperity.core.third_party import first_line
 
 if TYPE_CHECKING:
@@ -111,16 +117,101 @@ def netcdf_bytes(dataset: "xarray.Dataset", encoding: Mapping[str, Mapping[str, 
     return buffer.getvalue()
 
 
-def read_netcdf(path: Path, remedy: str) -> "xarray.Dataset":
-    """Read a netCDF file with a digest into memory; raises as `read_with_digest`."""
+def read_netcdf(path: Path, names: Collection[str], remedy: str) -> "xarray.Dataset":
+    """Read variables of a netCDF file with a digest into memory, by a subprocess with limits.
+
+    Raises
+    ------
+    UnreadableFile
+        as `read_with_digest`; or for content that is not stored in the file itself or that unpacks
+        to more than `limits.reading_limit`.
+    """
     import xarray
+
+    require_file(path)
+    variables, attributes = read_in_subprocess(
+        path.absolute(), f"{__name__}:unpack_netcdf", [*names], remedy, remedy=remedy
+    )
+    return xarray.Dataset(
+        {name: variable for name, variable in variables.items() if variable[0] != (name,)},
+        {name: variable for name, variable in variables.items() if variable[0] == (name,)},
+        attributes,
+    )
+
+
+def unpack_netcdf(
+    path: Path, names: Collection[str], remedy: str
+) -> tuple[dict[str, tuple[Any, ...]], dict[str, Any]]:
+    """Return named variables as (dimensions, values, attributes), and the file's attributes.
+
+    Runs in the subprocess of `core.sandbox`.
+    """
+    import h5netcdf
+    import h5py
 
     body = BytesIO(read_with_digest(path, remedy))
     try:
-        with xarray.open_dataset(body, engine="h5netcdf", decode_cf=False) as opened:
-            return opened.load()
+        with h5py.File(body, "r") as file:
+            for name in file:
+                _require_own_data(path, file, name, remedy)
+            present = [name for name in names if name in file]
+            size = float(sum(file[name].size * file[name].dtype.itemsize for name in present))
+            require_plausible_size(path, size, remedy)
+        with h5netcdf.File(body, "r") as opened:
+            variables = {
+                name: (
+                    opened[name].dimensions,
+                    np.asarray(opened[name][...]),
+                    dict(opened[name].attrs),
+                )
+                for name in present
+            }
+            if any(len({*along}) < len(along) for along, _, _ in variables.values()):
+                raise UnreadableFile(f"{path} has a variable with two equal dimensions; {remedy}")
+            return variables, dict(opened.attrs)
+    except UnreadableFile:
+        raise
+    except MemoryError:
+        raise
     except Exception as error:
         raise UnreadableFile(f"{path} is not a netCDF file; {remedy}") from error
+
+
+def _require_own_data(path: Path, file: Any, name: str, remedy: str) -> None:
+    """Raise UnreadableFile unless the file itself stores a variable."""
+    import h5py
+
+    link = file.get(name, getlink=True)
+    stored = file[name] if isinstance(link, h5py.HardLink) else None
+    if not isinstance(stored, h5py.Dataset) or stored.external or stored.is_virtual:
+        raise UnreadableFile(
+            f"{path} is not a saved result: {name[:40]!r} is not a variable stored in it; {remedy}"
+        )
+
+
+def unpack_arrays(body: bytes, name: str, remedy: str) -> dict[str, npt.NDArray[Any]]:
+    """Return the arrays of an npz file.
+
+    Raises
+    ------
+    UnreadableFile
+        if it declares more content than `limits.unpacked_limit`, or is damaged.
+    """
+    try:
+        with zipfile.ZipFile(BytesIO(body)) as packed:
+            declared = float(sum(entry.file_size for entry in packed.infolist()))
+        limit = unpacked_limit(len(body))
+        if declared > limit:
+            raise UnreadableFile(
+                f"{name} declares {declared / GIGABYTE:.2g} GB of content, more than the limit of "
+                f"{limit / GIGABYTE:.2g} GB; {remedy}"
+            )
+        with np.load(BytesIO(body), allow_pickle=False) as stored:
+            return {key: stored[key] for key in stored.files}
+    except UnreadableFile:
+        raise
+    except Exception as error:
+        raise UnreadableFile(f"{name} is damaged ({first_line(error)}); {remedy}") from error
 
 
 # Tables
@@ -145,16 +236,33 @@ def write_table(path: Path, table: "pyarrow.Table", case: str) -> None:
 
 
 def read_table(path: Path, case: str, remedy: str) -> "pyarrow.Table":
-    """Return the table that `write_table` wrote for this case; raise UnreadableFile for others."""
+    """Return the table that `write_table` wrote for this case, read by a subprocess with limits.
+
+    Raises
+    ------
+    UnreadableFile
+        for a damaged file, a table of another case, and one that unpacks to more than
+        `limits.reading_limit`.
+    """
+    require_file(path)
+    table: pyarrow.Table = read_in_subprocess(
+        path.absolute(), f"{__name__}:unpack_table", case, remedy, remedy=remedy
+    )
+    return table
+
+
+def unpack_table(path: Path, case: str, remedy: str) -> "pyarrow.Table":
+    """Return the table of a file, verified, in the subprocess of `core.sandbox`."""
     import pyarrow.parquet
 
-    require_file(path)
     try:
         table = pyarrow.parquet.read_table(path, page_checksum_verification=True)
         metadata = _metadata(table)
         stated = metadata.pop(_SEAL, None)
         table = table.replace_schema_metadata(metadata)
         content = _columns(table)
+    except MemoryError:
+        raise
     except Exception as error:
         raise UnreadableFile(f"{path} is damaged ({first_line(error)}); {remedy}") from error
     _verify(path, stated, content, remedy)

@@ -21,7 +21,7 @@ from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, UnreadableFile
 from asperity.core.processes import ignore_interrupts
 from asperity.core.signals import Spectrum, averaged_spectrum
-from asperity.core.storage import CONTENT_ENTRY, append_digest, strip_digest
+from asperity.core.storage import CONTENT_ENTRY, append_digest, strip_digest, unpack_arrays
 from asperity.monitoring.auxiliary_channels import (
     AuxiliaryData,
     bands,
@@ -324,11 +324,10 @@ def unpack_reading(packed: bytes, name: str) -> Reading:
         if the content is damaged.
     """
     remedy = "its recording is read again"
-    body = BytesIO(strip_digest(packed, name, remedy))
     try:
-        with np.load(body, allow_pickle=False) as stored:
-            density = stored["density"]
-            content = json.loads(str(stored[CONTENT_ENTRY]))
+        arrays = unpack_arrays(strip_digest(packed, name, remedy), name, remedy)
+        density = arrays["density"]
+        content = json.loads(str(arrays[CONTENT_ENTRY]))
         quality = content.pop("quality")
         spectrum = content.pop("spectrum")
         content["facts"] = {

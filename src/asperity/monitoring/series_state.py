@@ -17,7 +17,7 @@ from asperity.core.arrays import Mask
 from asperity.core.documents import JsonObject
 from asperity.core.errors import UnreadableFile
 from asperity.core.signals import Spectrum
-from asperity.core.storage import CONTENT_ENTRY, append_digest, strip_digest
+from asperity.core.storage import CONTENT_ENTRY, append_digest, strip_digest, unpack_arrays
 from asperity.resonance import (
     Agreement,
     CleanSpectrum,
@@ -251,11 +251,9 @@ def pack_shared(shared: Shared | SharedBySensors) -> bytes:
 def unpack_shared(content: bytes, since: int) -> SeriesMemory:
     """Unpack the result of `pack_shared`, `since` recordings old; empty if damaged."""
     try:
-        with np.load(
-            BytesIO(strip_digest(content, "the memory of a series", "it is learned again"))
-        ) as stored:
-            state = json.loads(str(stored[CONTENT_ENTRY]))
-            arrays = {name: stored[name] for name in stored.files if name != CONTENT_ENTRY}
+        name, remedy = "the memory of a series", "it is learned again"
+        arrays = unpack_arrays(strip_digest(content, name, remedy), name, remedy)
+        state = json.loads(str(arrays.pop(CONTENT_ENTRY)))
     except (UnreadableFile, KeyError):  # damaged, or of another version
         return SeriesMemory()
     by_sensor = {}

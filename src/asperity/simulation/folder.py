@@ -30,6 +30,7 @@ from asperity.core.storage import (
     read_with_digest,
     require_case,
     require_same_version,
+    unpack_arrays,
     version_notes,
     write_json,
     write_table,
@@ -103,8 +104,7 @@ class RunFolder:
         if not path.exists():
             return None
         try:
-            with np.load(BytesIO(read_with_digest(path, REMEDY)), allow_pickle=False) as stored:
-                arrays = {key: stored[key] for key in stored.files}
+            arrays = unpack_arrays(read_with_digest(path, REMEDY), str(path), REMEDY)
             require_case(path, str(arrays.pop(IDENTITY, "")), self.identity, REMEDY)
             return build(arrays)
         except UnreadableFile:

@@ -8,6 +8,7 @@ from asperity.contact.conditions import ContactConditions, ElasticPair
 from asperity.contact.grid import Grid
 from asperity.contact.rollers import RollerShape
 from asperity.core.errors import UnreadableFile
+from asperity.core.quantities import catalogue
 from asperity.core.storage import read_netcdf
 from asperity.ehl import (
     ContactSolution,
@@ -36,7 +37,7 @@ def load_solution(path: str | Path) -> ContactSolution:
         if the file is missing, damaged, or not a saved asperity run.
     """
     path, remedy = Path(path), "solve its case again"
-    dataset = read_netcdf(path, remedy)
+    dataset = read_netcdf(path, {*catalogue(), *STEPS, "y"}, remedy)
     if "asperity_format" not in dataset.attrs:
         raise UnreadableFile(
             f"{path} is a netCDF file but not a saved asperity run; solve a case to create one"

@@ -13,6 +13,7 @@ import numpy as np
 from asperity.core.arrays import Field
 from asperity.core.errors import AsperityError, BadInput, UnreadableFile
 from asperity.core.limits import require_plausible_size
+from asperity.core.sandbox import read_in_subprocess
 from asperity.core.storage import digest
 from asperity.core.third_party import first_line
 
@@ -47,19 +48,28 @@ def write_maps(folder: Path, study: str, case_id: str, maps: Mapping[str, Field]
 
 def read_maps(folder: Path, study: str, case_id: str) -> dict[str, Field]:
     """Read the maps of a case; UnreadableFile if there are none, or they belong to another case."""
-    zarr = require_zarr()
+    require_zarr()
     path = folder / MAPS / case_id
     if not path.is_dir():
         raise UnreadableFile(
             f"{folder} has no maps of case {case_id}; request them with --fields when computing it"
         )
+    maps: dict[str, Field] = read_in_subprocess(
+        path.absolute(), f"{__name__}:unpack_maps", study, case_id, remedy=REMEDY
+    )
+    return maps
+
+
+def unpack_maps(path: Path, study: str, case_id: str) -> dict[str, Field]:
+    """Return the maps of a group and verify their digest, in the subprocess of `core.sandbox`."""
+    zarr = require_zarr()
     try:
         group = zarr.open_group(path, mode="r", zarr_format=3)
         attributes = dict(group.attrs)
         arrays = dict(group.arrays())
         require_plausible_size(path, float(sum(array.nbytes for array in arrays.values())), REMEDY)
         maps = {name: np.asarray(array[...]) for name, array in sorted(arrays.items())}
-    except UnreadableFile:
+    except (UnreadableFile, MemoryError):
         raise
     except Exception as error:
         raise UnreadableFile(f"{path} is damaged ({first_line(error)}); {REMEDY}") from error

@@ -207,16 +207,19 @@ def _frame_contents(snapshot: Snapshot, identity: str) -> FileContents:
     return contents
 
 
+VARIABLES = ("gap", "pressure", "in_contact")  # of a frame, which are read
+
+
 def _frames(files: RunFolder, last: int) -> tuple[MotionFrame, ...]:
     """Read the maps of steps up to the last one."""
     frames = []
     for path in sorted((files.path / MAPS).glob("step-*.nc")):
         remedy = f"delete it, or {REMEDY}"
-        stored = read_netcdf(path, remedy)
+        stored = read_netcdf(path, VARIABLES, remedy)
         require_case(path, stored.attrs.get("case"), files.identity, remedy)
         number = int(stored.attrs["step"])
         when = float(stored.attrs["time_s"])
-        maps = [stored[name].values for name in ("gap", "pressure", "in_contact")]
+        maps = [stored[name].values for name in VARIABLES]
         if number <= last:
             frames.append(MotionFrame(number, when, maps[0], maps[1], maps[2].astype(bool)))
     return tuple(frames)
