@@ -110,6 +110,17 @@ def read_with_digest(path: Path, remedy: str) -> bytes:
     return content
 
 
+def stored_digest(path: Path) -> str:
+    """Return the digest that a file states at its end, or that of a file without one."""
+    with path.open("rb") as file:
+        file.seek(max(0, file.seek(0, os.SEEK_END) - _DIGITS - len(_MARK)))
+        end = file.read()
+        if end.startswith(_MARK):
+            return end[-_DIGITS:].decode("latin-1")
+        file.seek(0)
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
 def netcdf_bytes(dataset: "xarray.Dataset", encoding: Mapping[str, Mapping[str, object]]) -> bytes:
     """Return a dataset as netCDF bytes, made in memory, as HDF5 crashes on a full disk."""
     buffer = BytesIO()

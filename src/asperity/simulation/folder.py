@@ -7,7 +7,7 @@ results.
 import hashlib
 import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from io import BytesIO
@@ -30,6 +30,7 @@ from asperity.core.storage import (
     read_with_digest,
     require_case,
     require_same_version,
+    stored_digest,
     unpack_arrays,
     version_notes,
     write_json,
@@ -41,6 +42,8 @@ from asperity.surface import MovingSurfaces
 MEMORY, LOCK = "memory.npz", ".lock"  # state for the next step; held while a process works
 SAVE_INTERVAL_S = 2.0  # what a crash may cost
 IDENTITY = "identity"  # array that holds the digest of the case
+FILES = "files"  # digests of files: key of a table's metadata, or array with JSON
+NAMED = 3  # files that a remark names
 REMEDY = "compute the case into another folder"
 
 Arrays = dict[str, npt.NDArray[Any]]
@@ -93,10 +96,57 @@ class RunFolder:
         path = self.path / self.layout.table
         return read_table(path, self.identity, REMEDY) if path.exists() else None
 
-    def write_rows(self, table: "pyarrow.Table", case: Case) -> None:
-        """Write the rows, with the text of the case in the metadata."""
-        table = table.replace_schema_metadata({"case": case.text})
+    def write_rows(
+        self, table: "pyarrow.Table", case: Case, digests: Mapping[str, str] | None = None
+    ) -> None:
+        """Write the rows, with the text of the case and the digests of files in the metadata."""
+        metadata = {"case": case.text}
+        if digests is not None:
+            metadata[FILES] = json.dumps(digests)
+        table = table.replace_schema_metadata(metadata)
         write_table(self.path / self.layout.table, table, self.identity)
+
+    def digests(self, names: Iterable[str]) -> dict[str, str]:
+        """Return the digest of each file by its name in the folder; "" for the state."""
+        found = {name: stored_digest(self.path / name) for name in names}
+        # the state is written after the list, and again while a finished run is extended
+        return found | ({MEMORY: ""} if (self.path / MEMORY).exists() else {})
+
+    def check_files(
+        self, digests: Mapping[str, str], is_surplus: Callable[[str], bool]
+    ) -> tuple[list[str], tuple[str, ...]]:
+        """Return the listed files that are there, and remarks on all that differs from the list.
+
+        `is_surplus` tells which other files a stopped process may have left.
+
+        Raises
+        ------
+        UnreadableFile
+            for a listed file with another content.
+        """
+        present = {
+            path.relative_to(self.path).as_posix()
+            for folder in self.layout.subfolders
+            for path in (self.path / folder).glob("[!.]*")
+        }
+        lost = [name for name in digests if not (self.path / name).is_file()]
+        intact = [name for name in digests if name not in lost]
+        for name in intact:
+            if digests[name] not in ("", stored_digest(self.path / name)):
+                raise UnreadableFile(
+                    f"{self.path / name} is not the file that was stored, or is of another case; "
+                    f"remove it, and the {self.layout.contents} is shown without"
+                )
+        others = [name for name in sorted(present - {*digests}) if not is_surplus(name)]
+        remarks = []
+        if lost:
+            remarks.append(
+                f"{_named(lost)} missing since the {self.layout.contents} was stored; "
+                "it is shown without"
+            )
+        if others:
+            remarks.append(f"{_named(others)} not part of the {self.layout.contents}, and left out")
+        return intact, tuple(remarks)
 
     def arrays(self, name: str, build: Callable[[Arrays], T]) -> T | None:
         """Read a file of arrays and `build` an object from them; None if there is no file."""
@@ -122,6 +172,12 @@ class RunFolder:
         write_with_digest(self.path / name, packed.getvalue())
 
 
+def _named(names: Sequence[str]) -> str:
+    """Return the first of some files as the subject of a sentence."""
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return f"{', '.join(names[:NAMED])}{more} {'is' if len(names) == 1 else 'are'}"
+
+
 class RunRecorder(Generic[Row]):
     """Rows of a run, in memory and, with a folder, on disk."""
 
@@ -142,6 +198,13 @@ class RunRecorder(Generic[Row]):
             memory = self.files.path / MEMORY
             raise UnreadableFile(
                 f"{self.files.path / table} ends before {memory}; choose another folder"
+            )
+
+    def require_state(self, present: bool) -> None:
+        """Raise UnreadableFile if the state of a stored run is missing."""
+        if self.files is not None and not present:
+            raise UnreadableFile(
+                f"{self.files.path / MEMORY} is missing; restore it, or choose another folder"
             )
 
 

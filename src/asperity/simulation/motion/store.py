@@ -1,9 +1,11 @@
 """Result folder of a history: manifest, rows, maps of some steps, state for the next step."""
 
+import json
 import math
+import re
 import time
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -17,6 +19,7 @@ from asperity.core.quantities import quantity
 from asperity.core.storage import read_netcdf, require_case
 from asperity.ehl import FileContents
 from asperity.simulation.folder import (
+    FILES,
     MEMORY,
     REMEDY,
     Arrays,
@@ -50,16 +53,17 @@ def load_history(folder: str | Path) -> History:
     """
     folder = Path(folder)
     stored = stored_run(folder, LAYOUT)
-    rows = _rows(stored.files)
+    rows, digests = _rows(stored.files)
     if not rows:
         raise UnreadableFile(f"{folder} holds a history without a step; run its case again")
+    names, remarks = _checked_files(stored.files, digests, int(rows[-1]["step"]))
     return History(
         case=stored.case,
         table=pandas.DataFrame(rows),
-        frames=_frames(stored.files, int(rows[-1]["step"])),
+        frames=_frames(stored.files, names),
         folder=folder,
         memory=_memory(stored.files),
-        remarks=stored.remarks,
+        remarks=(*stored.remarks, *remarks),
     )
 
 
@@ -76,10 +80,20 @@ class HistoryRecorder(RunRecorder[Row]):
         self.case, self.every = case, every
         self.frames: list[MotionFrame] = []
         self.memory: Memory | None = None
-        if files is not None and (memory := _memory(files)) is not None:
+        self.remarks: tuple[str, ...] = ()
+        self._frame_names: list[str] = []
+        if files is None:
+            return
+        rows, digests = _rows(files)
+        memory = _memory(files)
+        # absent if the process was stopped at its first save
+        self.require_state(memory is not None or MEMORY not in digests)
+        if memory is not None:
             self.memory = memory
-            self.rows = [row for row in _rows(files) if row["step"] <= int(memory["number"])]
+            self.rows = [row for row in rows if row["step"] <= int(memory["number"])]
             self.require_rows(self.last == int(memory["number"]))
+            names, self.remarks = _checked_files(files, digests, self.last)
+            self._frame_names = [name for name in names if _step_of(name) <= self.last]
 
     @property
     def last(self) -> int:
@@ -105,29 +119,39 @@ class HistoryRecorder(RunRecorder[Row]):
                 MotionFrame(snapshot.number, snapshot.time, gap, pressure, solution.in_contact)
             )
         else:
-            path = self.files.path / MAPS / f"step-{snapshot.number:06d}.nc"
-            _frame_contents(snapshot, self.files.identity).save(path)
+            name = f"{MAPS}/step-{snapshot.number:06d}.nc"
+            _frame_contents(snapshot, self.files.identity).save(self.files.path / name)
+            self._frame_names.append(name)
 
     def save(self) -> None:
         """Write rows, then the state: a crash in between leaves surplus rows, which are dropped."""
         if self.files is None or self.memory is None:
             return
-        self.files.write_rows(pyarrow.Table.from_pylist(self.rows), self.case)
+        self._write_rows(self.files)
         self.files.write_arrays(MEMORY, {**self.memory})
         self.saved_at = time.monotonic()
+
+    def _write_rows(self, files: RunFolder) -> None:
+        digests = files.digests(self._frame_names)
+        files.write_rows(pyarrow.Table.from_pylist(self.rows), self.case, digests)
 
     def history(self, seconds: float, computed: int) -> History:
         """Save and return the history."""
         if computed:
             self.save()
+            if self.files is not None:
+                self._write_rows(self.files)  # again, as the state exists now
         return History(
             case=self.case,
             table=pandas.DataFrame(self.rows),
-            frames=tuple(self.frames) if self.files is None else _frames(self.files, self.last),
+            frames=tuple(self.frames)
+            if self.files is None
+            else _frames(self.files, self._frame_names),
             folder=None if self.files is None else self.files.path,
             seconds=seconds,
             computed=computed,
             memory=self.memory,
+            remarks=self.remarks,
         )
 
 
@@ -164,10 +188,28 @@ def _digest(case: Case, surfaces: MovingSurfaces) -> str:
     return case_digest(tables, surfaces)
 
 
-def _rows(files: RunFolder) -> list[Row]:
+def _rows(files: RunFolder) -> tuple[list[Row], dict[str, str]]:
+    """Return the stored rows, and the digests of the files that were stored with them."""
     table = files.rows()
-    rows: list[Row] = [] if table is None else table.to_pylist()
-    return rows
+    if table is None:
+        return [], {}
+    rows: list[Row] = table.to_pylist()
+    digests: dict[str, str] = json.loads(table.schema.metadata.get(FILES.encode(), b"{}"))
+    return rows, digests
+
+
+def _checked_files(
+    files: RunFolder, digests: Mapping[str, str], last: int
+) -> tuple[list[str], tuple[str, ...]]:
+    """Return the maps that belong to the steps up to the last one, and remarks on the others."""
+    names, remarks = files.check_files(digests, lambda name: _step_of(name) > last)
+    return [name for name in names if name != MEMORY], remarks
+
+
+def _step_of(name: str) -> int:
+    """Return the step of a file of maps by its name; -1 for other names."""
+    match = re.fullmatch(rf"{MAPS}/step-(\d+)\.nc", name)
+    return int(match[1]) if match else -1
 
 
 def _memory(files: RunFolder) -> Memory | None:
@@ -210,16 +252,15 @@ def _frame_contents(snapshot: Snapshot, identity: str) -> FileContents:
 VARIABLES = ("gap", "pressure", "in_contact")  # of a frame, which are read
 
 
-def _frames(files: RunFolder, last: int) -> tuple[MotionFrame, ...]:
-    """Read the maps of steps up to the last one."""
+def _frames(files: RunFolder, names: Iterable[str]) -> tuple[MotionFrame, ...]:
+    """Read files of maps, in order of their steps."""
     frames = []
-    for path in sorted((files.path / MAPS).glob("step-*.nc")):
-        remedy = f"delete it, or {REMEDY}"
+    for name in sorted(names):
+        path, remedy = files.path / name, f"delete it, or {REMEDY}"
         stored = read_netcdf(path, VARIABLES, remedy)
         require_case(path, stored.attrs.get("case"), files.identity, remedy)
         number = int(stored.attrs["step"])
         when = float(stored.attrs["time_s"])
         maps = [stored[name].values for name in VARIABLES]
-        if number <= last:
-            frames.append(MotionFrame(number, when, maps[0], maps[1], maps[2].astype(bool)))
+        frames.append(MotionFrame(number, when, maps[0], maps[1], maps[2].astype(bool)))
     return tuple(frames)

@@ -7,9 +7,10 @@ unchanged.
 """
 
 import json
+import re
 import time
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
@@ -20,7 +21,9 @@ import pyarrow
 
 from asperity.core.errors import UnreadableFile
 from asperity.simulation.folder import (
+    FILES,
     MEMORY,
+    REMEDY,
     Arrays,
     FolderLayout,
     RunFolder,
@@ -89,10 +92,11 @@ class WearRecorder(RunRecorder[Row]):
             return
         self.end = files.arrays(END, HistoryEnd.from_arrays)
         state = files.arrays(MEMORY, WearState.from_arrays)
+        self.require_state(state is not None or self.end is None)
         if state is not None:
             self.worn, self.rows = state, _rows(files)
             self.require_rows(len(self.rows) >= state.number)
-            self.frames = _frames(files, state.number)
+            self.frames = _frames(files, map(_frame_file, range(state.number)))
 
     def record(self, row: Row, frame: WearFrame) -> None:
         """Record row and frame of a jump, in place of an earlier one; drop surplus frames."""
@@ -129,7 +133,10 @@ class WearRecorder(RunRecorder[Row]):
         after = self.contact.worn_surfaces(state)
         for name, surfaces in (("before", self.contact.surfaces), ("after", after)):
             _write_both(surfaces, self.files.path / SURFACES, name)
-        self.files.write_arrays(END, self.end.arrays())
+        names = [_frame_file(number) for number in self.frames if number < state.number]
+        names += [f"{SURFACES}/{path.name}" for path in surface_files(self.files.path)]
+        digests = np.array(json.dumps(self.files.digests(names)))
+        self.files.write_arrays(END, {**self.end.arrays(), FILES: digests})
 
     def history(self, seconds: float, computed: int) -> WearHistory:
         """Return the finished history."""
@@ -205,8 +212,18 @@ def load_wear(folder: str | Path) -> WearHistory:
     assert case.wear is not None
     contact = WearingContact(case, case.wear, case.moving_surfaces())
     rows = _rows(files)
-    frames = _frames(files, end.worn.number)
-    return _history(contact, end, rows, frames, folder=folder, remarks=remarks)
+    if len(rows) < end.worn.number:
+        raise UnreadableFile(f"{folder / LAYOUT.table} ends before {folder / END}; {REMEDY}")
+    digests: dict[str, str] = files.arrays(END, _digests) or {}
+    last = end.worn.number
+
+    def is_surplus(name: str) -> bool:
+        number = _number_of(name)
+        return number >= last or (number >= 0 and not is_kept(number, last))
+
+    names, differing = files.check_files(digests, is_surplus)
+    frames = _frames(files, [name for name in names if _number_of(name) >= 0])
+    return _history(contact, end, rows, frames, folder=folder, remarks=(*remarks, *differing))
 
 
 def is_wear_folder(folder: Path) -> bool:
@@ -237,9 +254,20 @@ def _frame_file(number: int) -> str:
     return f"{FRAMES}/{number:06d}.npz"
 
 
-def _frames(files: RunFolder, before: int) -> dict[int, WearFrame]:
-    """Read the stored frames of jumps before that one."""
-    stored = (files.arrays(_frame_file(number), WearFrame.from_arrays) for number in range(before))
+def _number_of(name: str) -> int:
+    """Return the number of a frame by its file; -1 for other files."""
+    match = re.fullmatch(rf"{FRAMES}/(\d+)\.npz", name)
+    return int(match[1]) if match else -1
+
+
+def _digests(arrays: Arrays) -> dict[str, str]:
+    digests: dict[str, str] = json.loads(str(arrays.get(FILES, "{}")))
+    return digests
+
+
+def _frames(files: RunFolder, names: Iterable[str]) -> dict[int, WearFrame]:
+    """Read the stored frames among some files."""
+    stored = (files.arrays(name, WearFrame.from_arrays) for name in names)
     return {frame.number: frame for frame in stored if frame is not None}
 
 
