@@ -20,7 +20,7 @@ import asperity
 from asperity.core.documents import Table
 from asperity.core.errors import BadInput, UnreadableFile
 from asperity.core.files import require_file, write_bytes, write_text
-from asperity.core.limits import GIGABYTE, require_plausible_size, unpacked_limit
+from asperity.core.limits import GIGABYTE, unpacked_limit
 from asperity.core.sandbox import read_in_subprocess
 from asperity.core.third_party import first_line
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 MANIFEST = "manifest.json"
 _MARK, _DIGITS = b"\nasperity-sha256 ", 64
-_SEAL, _CASE = "seal", "asperity_case"  # keys of the digest and of a table's case
+SEAL, CASE = "seal", "asperity_case"  # keys of the digest and of a table's case
 
 
 def digest(content: object) -> str:
@@ -54,7 +54,8 @@ def _feed(state: "hashlib._Hash", content: Any) -> None:
         state.update(json.dumps(content, sort_keys=True).encode())
 
 
-def _verify(path: Path, stated: str | None, content: object, remedy: str) -> None:
+def verify(path: Path, stated: str | None, content: object, remedy: str) -> None:
+    """Raise UnreadableFile unless the digest of the content is the stated one."""
     if stated is None:
         raise UnreadableFile(
             f"{path} has no digest: it is from another version of asperity, truncated or modified; "
@@ -83,7 +84,7 @@ def strip_digest(content: bytes, name: str, remedy: str) -> bytes:
     body = content[: -_DIGITS - len(_MARK)]
     mark = content[-_DIGITS - len(_MARK) : -_DIGITS]
     stated = content[-_DIGITS:]
-    _verify(Path(name), stated.decode("latin-1") if mark == _MARK else None, body, remedy)
+    verify(Path(name), stated.decode("latin-1") if mark == _MARK else None, body, remedy)
     return body
 
 
@@ -104,7 +105,7 @@ def read_with_digest(path: Path, remedy: str) -> bytes:
             content = file.read(max(0, body)) if end.startswith(_MARK) else b""
     except OSError as error:
         raise UnreadableFile(f"{path} cannot be read: {error.strerror}; {remedy}") from None
-    _verify(
+    verify(
         path, end[-_DIGITS:].decode("latin-1") if end.startswith(_MARK) else None, content, remedy
     )
     return content
@@ -141,63 +142,13 @@ def read_netcdf(path: Path, names: Collection[str], remedy: str) -> "xarray.Data
 
     require_file(path)
     variables, attributes = read_in_subprocess(
-        path.absolute(), f"{__name__}:unpack_netcdf", [*names], remedy, remedy=remedy
+        path.absolute(), "asperity.core.unpacking:unpack_netcdf", [*names], remedy, remedy=remedy
     )
     return xarray.Dataset(
         {name: variable for name, variable in variables.items() if variable[0] != (name,)},
         {name: variable for name, variable in variables.items() if variable[0] == (name,)},
         attributes,
     )
-
-
-def unpack_netcdf(
-    path: Path, names: Collection[str], remedy: str
-) -> tuple[dict[str, tuple[Any, ...]], dict[str, Any]]:
-    """Return named variables as (dimensions, values, attributes), and the file's attributes.
-
-    Runs in the subprocess of `core.sandbox`.
-    """
-    import h5netcdf
-    import h5py
-
-    body = BytesIO(read_with_digest(path, remedy))
-    try:
-        with h5py.File(body, "r") as file:
-            for name in file:
-                _require_own_data(path, file, name, remedy)
-            present = [name for name in names if name in file]
-            size = float(sum(file[name].size * file[name].dtype.itemsize for name in present))
-            require_plausible_size(path, size, remedy)
-        with h5netcdf.File(body, "r") as opened:
-            variables = {
-                name: (
-                    opened[name].dimensions,
-                    np.asarray(opened[name][...]),
-                    dict(opened[name].attrs),
-                )
-                for name in present
-            }
-            if any(len({*along}) < len(along) for along, _, _ in variables.values()):
-                raise UnreadableFile(f"{path} has a variable with two equal dimensions; {remedy}")
-            return variables, dict(opened.attrs)
-    except UnreadableFile:
-        raise
-    except MemoryError:
-        raise
-    except Exception as error:
-        raise UnreadableFile(f"{path} is not a netCDF file; {remedy}") from error
-
-
-def _require_own_data(path: Path, file: Any, name: str, remedy: str) -> None:
-    """Raise UnreadableFile unless the file itself stores a variable."""
-    import h5py
-
-    link = file.get(name, getlink=True)
-    stored = file[name] if isinstance(link, h5py.HardLink) else None
-    if not isinstance(stored, h5py.Dataset) or stored.external or stored.is_virtual:
-        raise UnreadableFile(
-            f"{path} is not a saved result: {name[:40]!r} is not a variable stored in it; {remedy}"
-        )
 
 
 def unpack_arrays(body: bytes, name: str, remedy: str) -> dict[str, npt.NDArray[Any]]:
@@ -236,10 +187,10 @@ def write_table(path: Path, table: "pyarrow.Table", case: str) -> None:
     """
     import pyarrow.parquet
 
-    metadata = {**(table.schema.metadata or {}), _CASE.encode(): case.encode()}
+    metadata = {**(table.schema.metadata or {}), CASE.encode(): case.encode()}
     table = table.replace_schema_metadata(metadata)
     with_digest = table.replace_schema_metadata(
-        {**metadata, _SEAL.encode(): digest(_columns(table)).encode()}
+        {**metadata, SEAL.encode(): digest(table_content(table)).encode()}
     )
     buffer = BytesIO()
     pyarrow.parquet.write_table(with_digest, buffer, write_page_checksum=True)
@@ -257,27 +208,8 @@ def read_table(path: Path, case: str, remedy: str) -> "pyarrow.Table":
     """
     require_file(path)
     table: pyarrow.Table = read_in_subprocess(
-        path.absolute(), f"{__name__}:unpack_table", case, remedy, remedy=remedy
+        path.absolute(), "asperity.core.unpacking:unpack_table", case, remedy, remedy=remedy
     )
-    return table
-
-
-def unpack_table(path: Path, case: str, remedy: str) -> "pyarrow.Table":
-    """Return the table of a file, verified, in the subprocess of `core.sandbox`."""
-    import pyarrow.parquet
-
-    try:
-        table = pyarrow.parquet.read_table(path, page_checksum_verification=True)
-        metadata = _metadata(table)
-        stated = metadata.pop(_SEAL, None)
-        table = table.replace_schema_metadata(metadata)
-        content = _columns(table)
-    except MemoryError:
-        raise
-    except Exception as error:
-        raise UnreadableFile(f"{path} is damaged ({first_line(error)}); {remedy}") from error
-    _verify(path, stated, content, remedy)
-    require_case(path, metadata.get(_CASE), case, remedy)
     return table
 
 
@@ -287,16 +219,17 @@ def require_case(path: Path, found: str | None, case: str, remedy: str) -> None:
         raise UnreadableFile(f"{path} belongs to another case than its folder; {remedy}")
 
 
-def _metadata(table: "pyarrow.Table") -> dict[str, str]:
+def table_metadata(table: "pyarrow.Table") -> dict[str, str]:
+    """Return the metadata of a table as text."""
     metadata = table.schema.metadata or {}
     return {key.decode(): value.decode() for key, value in metadata.items()}
 
 
-def _columns(table: "pyarrow.Table") -> dict[str, object]:
+def table_content(table: "pyarrow.Table") -> dict[str, object]:
     """Return a table's metadata, and the type and values of each column."""
     import pyarrow
 
-    content: dict[str, object] = {"": [_metadata(table), table.column_names]}
+    content: dict[str, object] = {"": [table_metadata(table), table.column_names]}
     for name, column in zip(table.column_names, table.columns, strict=True):
         kind = column.type
         # parquet renames the items of a list type
@@ -318,7 +251,7 @@ def _columns(table: "pyarrow.Table") -> dict[str, object]:
 def write_json(path: Path, content: Table) -> None:
     """Write a JSON object with its digest; raises as `files.atomic_write`."""
     plain = json.loads(json.dumps(content))
-    write_text(path, json.dumps({**plain, _SEAL: digest(plain)}, indent=1))
+    write_text(path, json.dumps({**plain, SEAL: digest(plain)}, indent=1))
 
 
 def read_json(path: Path, remedy: str) -> dict[str, Any]:
@@ -330,7 +263,7 @@ def read_json(path: Path, remedy: str) -> dict[str, Any]:
         raise UnreadableFile(f"{path} is damaged; {remedy}") from None
     if not isinstance(content, dict):
         raise UnreadableFile(f"{path} is damaged: it is not a JSON object; {remedy}")
-    _verify(path, content.pop(_SEAL, None), content, remedy)
+    verify(path, content.pop(SEAL, None), content, remedy)
     return content
 
 

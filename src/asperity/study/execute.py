@@ -81,6 +81,7 @@ class StudyResult(Displayed):
     path: Path | None = None  # of the merged table
     seconds: float = 0.0
     computed: int = 0  # in this call; the other rows were stored before
+    remarks: tuple[str, ...] = ()  # on files that are missing
 
     @property
     def failures(self) -> pandas.DataFrame:
@@ -175,7 +176,9 @@ def run_study(
             table = ordered_table([rows_table(work.rows)] if work.rows else [], plan)
             return StudyResult(plan, table, seconds=seconds, computed=work.done)
         path = store.merge()
-        return StudyResult(plan, store.table(), store.folder, path, seconds, work.done)
+        return StudyResult(
+            plan, store.table(), store.folder, path, seconds, work.done, store.remarks()
+        )
 
 
 def _progress_text(state: StudyProgress) -> tuple[float, str]:
@@ -219,7 +222,9 @@ def load_study(folder: str | Path) -> StudyResult:
         if the folder holds no study or is damaged.
     """
     store = load_study_folder(Path(folder))
-    return StudyResult(store.plan, store.table(), store.folder, store.merged)
+    return StudyResult(
+        store.plan, store.table(), store.folder, store.merged, remarks=store.remarks()
+    )
 
 
 @contextmanager

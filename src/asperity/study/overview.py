@@ -164,7 +164,7 @@ class StudyOverview:
     @cached_property
     def notes(self) -> list[str]:
         """Sentences that qualify the numbers."""
-        notes = list(version_notes(self.result.versions))
+        notes = [*version_notes(self.result.versions), *self.result.remarks]
         if self.result.missing:
             share = f"{self.result.missing} of {len(self.result.plan.cases)} cases"
             notes.append(f"{share} have not been computed yet: run the study again.")

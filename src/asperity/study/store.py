@@ -32,11 +32,12 @@ from asperity.core.storage import (
     write_table,
 )
 from asperity.study.evaluate import Row
-from asperity.study.maps import read_maps, write_maps
+from asperity.study.maps import MAPS, read_maps, write_maps
 from asperity.study.plan import SEED_KEYS, StudyPlan, plan_points
 
 FORMAT = 2  # increases when readers of the previous format cannot read the folder
 PARTS, TABLE = "parts", "table.parquet"
+MAPPED = b"mapped"  # key of a part's metadata: cases whose maps were stored
 STALE_S = 3600.0  # age from which on no other shard can still be writing a temporary file
 _LEADING = ("case_id", "number", "point", "realisation", "status", "reason")
 
@@ -67,11 +68,23 @@ class StudyFolder:
         names = hashlib.sha256(
             "".join(f"{row['case_id']}{row['attempt']}" for row in rows).encode()
         ).hexdigest()
-        self._write(self.folder / PARTS / f"{names[:20]}.parquet", rows_table(rows))
+        mapped = json.dumps([case_id for case_id, fields in maps.items() if fields])
+        table = rows_table(rows).replace_schema_metadata({MAPPED: mapped})
+        self._write(self.folder / PARTS / f"{names[:20]}.parquet", table)
 
     def maps(self, case_id: str) -> dict[str, Field]:
         """Read the maps of a case; UnreadableFile if there are none or they are damaged."""
         return read_maps(self.folder, self.design, case_id)
+
+    def remarks(self) -> tuple[str, ...]:
+        """Return a remark on maps that were stored and are missing."""
+        mapped: set[str] = set()
+        for path in self._parts():
+            metadata = self._read_part(path).schema.metadata or {}
+            mapped |= {*json.loads(metadata.get(MAPPED, b"[]"))}
+        lost = sum(not (self.folder / MAPS / case_id).is_dir() for case_id in mapped)
+        cases = f"{lost} of {len(mapped)} cases"
+        return (f"The stored maps of {cases} are missing in {self.folder}",) if lost else ()
 
     def merge(self) -> Path:
         """Write all finished cases as one table, in the order of the plan; return its path."""

@@ -15,6 +15,8 @@ def study_verdict(result: StudyResult) -> str:
     curve = None if result.missing else finished_curve(result)
     if curve is not None:
         sentence += f". {curve.verdict()}"
+    if result.remarks:
+        sentence = f"{sentence.rstrip('.')}. {'. '.join(result.remarks)}"
     return f"{sentence.rstrip('.')}."
 
 
