@@ -315,6 +315,26 @@ def test_invalid_notification_targets_are_refused_before_reading(asp, option, va
     assert not Path(STORE).exists()
 
 
+@pytest.mark.parametrize(
+    "address",
+    [
+        "https://user:s3#q7@host/hook",
+        "https://user:80#q7@host/hook",
+        "https://user:s3q7\n@host/hook",
+        "https://user:s3q7@host/a hook",
+        "ftp://user:s3q7@host",
+        "https://user:s3q7@host:port/hook",
+    ],
+)
+def test_a_refused_address_does_not_print_its_password(asp, address):
+    snapshots(np.ones(3))
+    code, _, err = watch(asp, "--webhook", address)
+    assert code == 2
+    assert "special characters of a password are written as %23" in err
+    for part in ("s3", "q7", "user"):
+        assert part not in err
+
+
 def test_mqtt_without_its_library_names_the_package_to_install(asp, monkeypatch):
     snapshots(np.ones(3))
     monkeypatch.setitem(sys.modules, "paho.mqtt.client", None)

@@ -1,12 +1,14 @@
 import logging
+import time
 import warnings
 
 import numpy as np
 import pytest
 
+from asperity.contact.grid import Grid
 from asperity.core.errors import BadInput, UnreadableFile
 from asperity.core.third_party import suppress_output, surface_topography
-from asperity.surface import read_surface
+from asperity.surface import Surface, read_surface, write_surface
 
 
 def xyz(path, cells=(20, 12), pixel=(2.0, 3.0)):
@@ -274,3 +276,12 @@ def test_a_declared_marker_is_a_missing_height(tmp_path):
     surface = read_surface(path, unit="m", pixel=2e-6)
     assert np.isnan(surface.heights).sum() == 2
     assert np.nanmax(np.abs(surface.heights)) < 1e-6
+
+
+def test_equal_surfaces_are_written_as_equal_files(tmp_path):
+    grid = Grid((9, 8), (0.0, 0.0), (9e-6, 8e-6))
+    surface = Surface(np.random.default_rng(1).standard_normal((9, 8)) * 1e-6, grid)
+    first = write_surface(surface, tmp_path / "first.x3p").read_bytes()
+    time.sleep(1.1)  # the date of a file has seconds
+    assert write_surface(surface, tmp_path / "second.x3p").read_bytes() == first
+    np.testing.assert_array_equal(read_surface(tmp_path / "first.x3p").heights, surface.heights)

@@ -6,6 +6,7 @@ a failed one is sent again.
 
 import json
 import os
+import re
 import shlex
 import shutil
 import signal
@@ -303,13 +304,16 @@ def require_address(url: str, schemes: Sequence[str], example: str) -> None:
             parts.scheme in schemes
             and bool(parts.hostname)
             and (parts.port is None or parts.port > 0)
+            and "@" not in parts.fragment  # the rest of a password with "#"
+            and not re.search(r"[\s\x00-\x1f]", url)
         )
     except ValueError:
         fits = False
     if not fits:
+        shown = re.sub(r"//.*@", "//...@", url, flags=re.DOTALL)
         raise BadInput(
-            f"an address such as {example} is needed, got {url!r}; "
-            f"it begins with {' or '.join(schemes)}"
+            f"an address such as {example} is needed, got {shown[:80]!r}; it begins with "
+            f"{' or '.join(schemes)}, and special characters of a password are written as %23"
         )
 
 

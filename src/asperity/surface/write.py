@@ -21,6 +21,8 @@ def write_surface(surface: Surface, path: str | Path) -> Path:
 
     path, buffer, (dx, dy) = Path(path), BytesIO(), surface.grid.spacing
     revision = x3pio.Revision.ISO5436_2000  # SurfaceTopography reads no newer one
-    x3pio.write(buffer, surface.heights.T, x_scale=dx, y_scale=dy, revision=revision)
+    file = x3pio.Surface.from_array(surface.heights.T, x_scale=dx, y_scale=dy, revision=revision)
+    file.metadata = None  # no instrument, and no date: equal surfaces are equal files
+    file.save(buffer)
     write_bytes(path, buffer.getvalue())
     return path
