@@ -9,10 +9,12 @@ import pytest
 
 from asperity.core.errors import UnreadableFile
 from asperity.core.storage import (
+    append_digest,
     digest,
     read_json,
     read_table,
     read_with_digest,
+    strip_digest,
     version_notes,
     write_json,
     write_table,
@@ -148,3 +150,12 @@ def test_a_flipped_bit_in_a_history_is_refused_or_changes_nothing(histories, tmp
             continue
         assert again.table.equals(history.table)
         assert again.case == history.case
+
+
+@pytest.mark.parametrize("body", [b"", b"a", bytes(range(256)) * 9])
+def test_bytes_with_a_digest_are_returned_unchanged(body):
+    packed = append_digest(body)
+    assert strip_digest(packed, "content", "remedy") == body
+    for damaged in (packed[:-1], packed[1:], b"x" + packed, body):
+        with pytest.raises(UnreadableFile, match=r"content .*; remedy"):
+            strip_digest(damaged, "content", "remedy")

@@ -10,6 +10,7 @@ import pandas
 
 from asperity.core.errors import BadInput, UnreadableFile
 from asperity.core.files import require_file
+from asperity.core.sandbox import read_in_subprocess
 from asperity.core.third_party import first_line
 from asperity.recording import acceleration_scale
 
@@ -20,6 +21,7 @@ BLOCK = 100_000  # rows that are held as lists
 WAVEFORM = "values"  # key of the samples of a recording in JSON lines
 UNIT_COLUMNS = ("unit", "units", "einheit")
 METRES = "m/s^2"
+REMEDY = "give columns time, rms"
 
 
 def read_table(path: Path) -> pandas.DataFrame:
@@ -43,9 +45,9 @@ def read_table(path: Path) -> pandas.DataFrame:
         raise BadInput(f"{path.name} is above {MOST_BYTES / 1e6:.0f} MB; split it, or average rows")
     try:
         if suffix == ".parquet":
-            table = pandas.read_parquet(path)
-            if not isinstance(table.index, pandas.RangeIndex):
-                table = table.reset_index()
+            table: pandas.DataFrame = read_in_subprocess(
+                path.absolute(), f"{__name__}:read_parquet", remedy=REMEDY
+            )
         else:
             table = _read_json(path) if suffix in (".jsonl", ".ndjson") else _read_csv(path)
     except ImportError:
@@ -55,11 +57,24 @@ def read_table(path: Path) -> pandas.DataFrame:
         raise
     except (OSError, ValueError, csv.Error, RecursionError) as error:  # of pandas and pyarrow too
         raise UnreadableFile(
-            f"{path.name} cannot be read as a table ({first_line(error)}); give columns time, rms"
+            f"{path.name} cannot be read as a table ({first_line(error)}); {REMEDY}"
         ) from None
     if not len(table):
         raise BadInput(f"{path.name} has no rows; give time stamps and values")
     return table.set_axis(_distinct([str(name).strip() for name in table.columns]), axis=1)
+
+
+def read_parquet(path: Path) -> pandas.DataFrame:
+    """Return the columns of a parquet file, and its index unless that numbers the rows."""
+    try:
+        table = pandas.read_parquet(path)
+    except (OSError, ValueError) as error:
+        raise UnreadableFile(
+            f"{path.name} cannot be read as a table ({first_line(error)}); {REMEDY}"
+        ) from None
+    if not isinstance(table.index, pandas.RangeIndex):
+        table = table.reset_index()
+    return table
 
 
 def _distinct(names: list[str]) -> list[str]:
