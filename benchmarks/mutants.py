@@ -1,6 +1,6 @@
 """Mutants drawn by lot in the modules that decide results, and the share that tests find.
 
-`python -m benchmarks.mutants [--each 12] [--seed 1] [MODULE ...]` changes one operator, number or
+`python -m benchmarks.mutants [--count 12] [--seed 1] [MODULE ...]` changes one operator, number or
 branch at a time in a copy of the sources, as cosmic-ray defines them, and runs the tests of the
 module. Needs `pip install cosmic-ray`; a mutant takes up to three minutes.
 """
@@ -149,7 +149,7 @@ def survives(tree: Path, module: str, mutant: Mutant) -> tuple[bool, float]:
     return passed, time.monotonic() - began
 
 
-def lines(modules: list[str], each: int, seed: int) -> Iterator[str]:
+def lines(modules: list[str], count: int, seed: int) -> Iterator[str]:
     """Run mutants of each module and yield a table, then the survivors."""
     survivors = []
     yield "| module | mutants | found by its tests | longest [s] |\n|---|---|---|---|"
@@ -159,7 +159,7 @@ def lines(modules: list[str], each: int, seed: int) -> Iterator[str]:
         counts = [0, 0]
         for module in modules:
             source = (tree / "src/asperity" / module).read_text("utf-8")
-            drawn = draw(source, each, random.Random(f"{seed} {module}"))
+            drawn = draw(source, count, random.Random(f"{seed} {module}"))
             found, longest = 0, 0.0
             for mutant in drawn:
                 passed, seconds = survives(tree, module, mutant)
@@ -178,11 +178,11 @@ def lines(modules: list[str], each: int, seed: int) -> Iterator[str]:
 def main() -> None:
     """Run the mutants that the command line asks for."""
     arguments = argparse.ArgumentParser(prog="python -m benchmarks.mutants", description=__doc__)
-    arguments.add_argument("--each", type=int, default=12, help="mutants of each module")
+    arguments.add_argument("--count", type=int, default=12, help="mutants of each module")
     arguments.add_argument("--seed", type=int, default=1)
     arguments.add_argument("modules", nargs="*", help=", ".join(MODULES))
     options = arguments.parse_args()
-    for line in lines(options.modules or [*MODULES], options.each, options.seed):
+    for line in lines(options.modules or [*MODULES], options.count, options.seed):
         print(line, flush=True)
 
 
