@@ -4,7 +4,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import asperity as asp
-from asperity.case import load_machine
+from asperity.case import case_template, load_machine
 from asperity.machines import machine_conditions
 from asperity.paper import RigSettings, simulate_rig, write_rig
 from asperity.report.style import write_figure
@@ -14,10 +14,12 @@ IMAGES = DOCS / "images"
 
 
 def main() -> None:
-    """Draw the bearing of an example, and the trend of the simulated wear test."""
-    bearing = machine_conditions(load_machine(DOCS.parent / "examples" / "6206.toml"))
-    write_figure(bearing.plot().figure, IMAGES / "bearing.png")
+    """Draw the bearing of the template, and the trend of the simulated wear test."""
     with TemporaryDirectory() as folder:
+        template = Path(folder, "bearing.toml")
+        template.write_text(case_template("bearing"), "utf-8")
+        bearing = machine_conditions(load_machine(template))
+        write_figure(bearing.plot().figure, IMAGES / "bearing.png")
         rig = Path(folder, "rig")
         recordings = write_rig(simulate_rig(RigSettings()), rig)
         case = asp.load_case(rig / "rig.toml")

@@ -36,6 +36,7 @@ from asperity.study import (
     load_study,
     overview,
     plan_points,
+    plan_study,
     run_study,
     swept_axis,
 )
@@ -396,6 +397,15 @@ def test_surfaces_share_one_scale(overview_of_wear):
     assert len({image.get_clim() for image in images}) == 1
     spread = [float(np.std(image.get_array())) for image in images]
     assert spread == pytest.approx(LEVELS_UM, rel=1e-6)  # um
+
+
+def test_maps_of_running_roughness_are_the_contacts_of_the_table():
+    """They were solved on another grid, and a note blamed other versions of asperity."""
+    case = PAPERS.with_overrides(
+        {"study": {"sq": ["0.5 um", "1 um"], "seeds": 1}, "surface.correlation_length": "40 um"}
+    )
+    result = run_study(plan_study(case), workers=1)
+    assert not [note for note in StudyOverview(result).notes if "mapped" in note]
 
 
 def test_a_map_that_differs_from_the_table_is_noted(wear):

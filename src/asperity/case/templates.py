@@ -198,12 +198,14 @@ COMMANDS: Mapping[str, tuple[str, ...]] = MappingProxyType(  # that a template i
         "study": ("study {case} --out {name}", "report {name}"),
         "wear": ("wear {case} --hours 0.3 --out {name} --report {name}.html",),
         "track": (
-            "rig --out recordings --repeats 2 --duration '2 s'",
-            "track recordings --table recordings/table.csv --case {case} --report {name}.html",
+            "rig --out {name}-recordings --repeats 2 --duration '2 s'",
+            "track {name}-recordings --table {name}-recordings/table.csv --case {case} "
+            "--report {name}.html",
         ),
         "infer": (
-            "rig --out recordings --samples 2 --repeats 3 --snr 20",
-            "infer recordings --table recordings/table.csv --case {case} --report {name}.html",
+            "rig --out {name}-recordings --samples 1 --repeats 6 --snr 20",
+            "infer {name}-recordings --table {name}-recordings/table.csv --case {case} "
+            "--report {name}.html",
         ),
     }
 )

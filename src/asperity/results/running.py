@@ -83,7 +83,7 @@ class Running:
     first `cut` passages of `steps_per_passage` steps being cut off.
     """
 
-    numbers: dict[str, Scalar]
+    numbers: dict[str, Scalar] = field(repr=False)
     clr: TimeMean
     snapshot_clr: float | None
     tracks: int
@@ -92,8 +92,8 @@ class Running:
     failed: int
     cut: int
     steps_per_passage: int
-    time_s: tuple[float, ...]
-    series: tuple[float, ...]
+    time_s: tuple[float, ...] = field(repr=False)
+    series: tuple[float, ...] = field(repr=False)
 
     @property
     def converged(self) -> bool:

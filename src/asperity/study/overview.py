@@ -151,7 +151,8 @@ class StudyOverview:
             if self.progress is not None:
                 self.progress(f"map {count} of {len(self.mapped)}")
             try:
-                case = self.result.plan.case.with_written(self.result.plan.cases[number].overrides)
+                overrides = self.result.plan.cases[number].overrides
+                case = self.result.plan.case.with_written(overrides).among_many
                 with threadpool_limits(1):  # as in the study, for bit-identical results
                     runs.append(solve_case(case, strict=False))
             except AsperityError as refusal:
@@ -192,12 +193,13 @@ class StudyOverview:
         rows = self.used[self.used["number"].isin(self.mapped)]
         shares = rows["clr"] if len(rows) else ()
         share = quantity("clr")
+        again = [float(run.scalars()["clr"] or 0.0) for run in runs]
         return [
             f"The contact mapped at Sq {run.state.sq * 1e6:.3g} µm has a CLR of "
-            f"{share.text(run.state.clr)} when solved again, but {share.text(clr)} in the study's "
+            f"{share.text(solved)} when solved again, but {share.text(clr)} in the study's "
             "table, which other versions computed."
-            for clr, run in zip(shares, runs, strict=True)
-            if abs(run.state.clr - clr) > VISIBLE_DIFFERENCE
+            for clr, solved, run in zip(shares, again, runs, strict=True)
+            if abs(solved - clr) > VISIBLE_DIFFERENCE
         ]
 
     @cached_property

@@ -49,10 +49,14 @@ class Solved(Protocol):
         ...
 
 
+_AT_ONE_INSTANT = {True: " at one instant of the running contact", False: ""}
+
+
 def contact_map(run: Run) -> Exhibit:
     """Map asperity contact, oil film and cavitated film (Fig 6 of the paper)."""
     solution = run.solution
-    car = run.state.car
+    zone = hertz_zone(solution.conditions, solution.grid)
+    car = float(np.mean(solution.in_contact[zone]))  # the run's may be a mean over time
     cavitated_share = run.sharing.cavitated
     contact, cavitated, film = (
         quantity("share").text(share)
@@ -64,7 +68,8 @@ def contact_map(run: Run) -> Exhibit:
         figure, axes = map_figure(medium, solution.grid.extent)
         show_map(axes, contact_colours(solution), solution)
         mark_hertz_zone(axes, solution, "black")
-        axes.set_title(f"Asperity contact on {contact} of the Hertz zone")
+        moment = "" if run.running is None else ", one instant"
+        axes.set_title(f"Asperity contact on {contact} of the Hertz zone{moment}")
         others = (f"open gap {film}",) if dry else (f"oil film {film}", f"cavitated {cavitated}")
         keys = contact_keys(f"asperity contact {contact}", *others)
         figure.legend(handles=keys, loc="lower center", ncols=2, borderaxespad=0.2)
@@ -73,7 +78,8 @@ def contact_map(run: Run) -> Exhibit:
     return Exhibit(
         "contact",
         draw,
-        "Contact state, shares of the Hertz zone. Contact: gap of at most "
+        f"Contact state{_AT_ONE_INSTANT[run.running is not None]}, shares of the Hertz zone. "
+        "Contact: gap of at most "
         f"{quantity('contact_film_m').text(solution.options.contact_film)}. "
         "Dashed: the Hertz zone; oil enters from the left.",
         f"Map of the contact: asperities touch on {contact} of the Hertz zone, "

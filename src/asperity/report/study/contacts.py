@@ -12,6 +12,7 @@ from asperity.report.drawing import display, legend_below, panels_in_rows, panel
 from asperity.report.maps import contact_colours, contact_keys, mark_hertz_zone, show_map
 from asperity.report.style import Medium, Style
 from asperity.results import Run
+from asperity.solution import contact_state
 
 SHARES = ("clr", "car", "car_domain")
 
@@ -43,7 +44,8 @@ def contact_maps(runs: Sequence[Run]) -> Exhibit:
         "contact-maps",
         draw,
         "Contact state of one surface per level: asperity contact yellow, oil film blue, cavitated "
-        "film striped; oil enters from the left. The shares are those of the surface shown.",
+        "film striped; oil enters from the left. The shares are those of the map, at "
+        "one instant if the roughness runs.",
         f"Contact maps. {values}.",
     )
 
@@ -77,7 +79,8 @@ def _sq(run: Run) -> str:
 
 
 def _shares(run: Run) -> list[str]:
-    return [quantity(key).named(getattr(run.state, key)) for key in SHARES]
+    state = contact_state(run.solution)  # of the map; the run's may be a mean over time
+    return [quantity(key).named(getattr(state, key)) for key in SHARES]
 
 
 def _sheet(
