@@ -40,11 +40,11 @@ MODULES = {  # with the tests that are to find its mutants
         "unit/test_benchmarks.py"
     ),
     "case/units.py": (
-        "unit/test_case.py unit/test_quantities.py unit/test_oil_case.py unit/test_machine.py "
-        "end_to_end/test_bad_input.py"
+        "unit/test_units.py unit/test_case.py unit/test_quantities.py unit/test_oil_case.py "
+        "unit/test_machine.py end_to_end/test_bad_input.py"
     ),
     "ehl/load_shares.py": (
-        "validation/test_mixed_contact.py validation/test_error_estimate.py "
+        "unit/test_zones.py validation/test_mixed_contact.py validation/test_error_estimate.py "
         "unit/test_coupling.py unit/test_trend.py"
     ),
     "ehl/models/mixed.py": (
