@@ -55,7 +55,7 @@ MODULES = {  # with the tests that are to find its mutants
         "unit/test_indicators.py unit/test_lines.py unit/test_rig.py validation/test_resonance.py"
     ),
     "ehl/grid_design.py": (
-        "unit/test_positions.py unit/test_grid.py unit/test_chosen_grid.py "
+        "unit/test_positions.py unit/test_rollers.py unit/test_grid.py unit/test_chosen_grid.py "
         "validation/test_auto_grid.py validation/test_two_pressures.py"
     ),
     "monitoring/store/database.py": (

@@ -182,9 +182,16 @@ def test_the_chosen_grid_ends_beyond_the_roller_or_its_loaded_part():
     part = auto_grid(crowned_roller, None)
     assert part.upper[1] < 0.4 * LENGTH
     assert part.upper[1] > crowned_roller.sliced_load.ends[1]
+    assert part.lower[1] == pytest.approx(-part.upper[1], rel=1e-9)  # as the crown is symmetric
     tilted = auto_grid(roller(ISO.tilted(5e-3)), None)
     assert tilted.upper[1] < 0.3 * LENGTH
     assert tilted.y[3] < -0.5 * LENGTH < tilted.y[4]
+
+
+@pytest.mark.parametrize("accuracy", [-0.5, 0.0, 0.9e-4, 0.21, 1.0])
+def test_an_accuracy_out_of_range_is_refused(accuracy):
+    with pytest.raises(asp.BadInput, match=r"accuracy must lie between 0\.0001 and 0\.2"):
+        auto_grid(roller(ISO), None, accuracy=accuracy)
 
 
 def test_a_grid_that_cuts_the_load_off_is_refused():
