@@ -185,6 +185,7 @@ def test_an_empty_page_of_recordings_offers_an_example(browser, tmp_path):
         visit = Visit(browser, server)
         page = visit.go("recordings")
         page.get_by_text(re.compile("^Drop recordings .* or try an example")).wait_for()
+        expect(page.locator("footer")).to_have_text(re.compile(r"^asperity \S+$"))
         assert page.get_by_role("img").count() == 0  # no empty frames
         page.get_by_role("button", name="Try an example").click()
         page.get_by_text("12 recordings read").wait_for()
