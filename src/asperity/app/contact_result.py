@@ -94,6 +94,12 @@ class ContactMaps:
         """Return the row of cells nearest to y [m]."""
         return int(np.argmin(np.abs(self.y - y)))
 
+    def has_cells_of(self, other: "ContactMaps") -> bool:
+        """Return True if both have the same domain and the same number of cells."""
+        return self.gap.shape == other.gap.shape and np.allclose(
+            self.extent, other.extent, rtol=1e-6, atol=0.0
+        )
+
     def hertz(self, row: int) -> Field:
         """Return the Hertz pressure of the smooth, dry contact along a row of cells [Pa]."""
         y = 0.0 if self.endless else float(self.y[row])

@@ -153,9 +153,9 @@ class MapFigures:
         return plot
 
     def show(self, result: ContactMaps, pinned: ContactMaps | None) -> None:
-        """Draw a result, and its film minus a pinned one on the same grid (`compares`)."""
+        """Draw a result, and its film minus a pinned one on the same cells (`compares`)."""
         (x0, x1), (y0, y1) = ((to_display("x_m", end) for end in axis) for axis in result.extent)
-        self.compares = pinned is not None and pinned.gap.shape == result.gap.shape
+        self.compares = pinned is not None and result.has_cells_of(pinned)
         if self.compares and self.change is None:
             self.change = self._map("Film minus pinned film", CHANGES, "gap")
         self._set_extent((x0, x1), (y0, y1))

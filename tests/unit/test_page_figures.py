@@ -1,0 +1,44 @@
+"""Figures of the page: comparison of maps, and the Stribeck curve without points."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("panel", reason="the extra page is not installed")
+
+from asperity.app.contact_result import OPEN, ContactMaps
+from asperity.app.map_images import DIFFERS, MapImages
+
+HALF_WIDTHS = (50e-6, 40e-6)
+
+
+def contact_maps(scale=1.0, cells=(8, 6)):
+    """Return maps on a domain of `scale` times 200 by 160 µm."""
+    x, y = (np.linspace(-scale, scale, count) * 1e-4 for count in cells)
+    return ContactMaps(
+        x=x,
+        y=y,
+        extent=((-scale * 1e-4, scale * 1e-4), (-scale * 8e-5, scale * 8e-5)),
+        gap=np.full(cells, 1e-6),
+        pressure=np.full(cells, 1e8),
+        cells=np.full(cells, OPEN, np.uint8),
+        gap_top=2e-6,
+        half_widths=HALF_WIDTHS,
+        hertz_pressure=1e9,
+        endless=False,
+    )
+
+
+@pytest.mark.parametrize("pinned", [contact_maps(1.3), contact_maps(cells=(10, 6))])
+def test_films_are_subtracted_on_equal_cells_only(pinned):
+    images = MapImages()
+    images.make()
+    shown = contact_maps()
+    images.show(shown, replace(shown, gap=shown.gap + 1e-6))
+    assert images.change.children[0].title.text == "Film minus pinned film"
+    images.show(shown, pinned)
+    assert images.change.visible
+    assert DIFFERS in images.change.children[0].text
+    images.show(shown, None)
+    assert not images.change.visible
