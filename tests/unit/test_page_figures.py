@@ -1,6 +1,7 @@
 """Figures of the page: comparison of maps, and the Stribeck curve without points."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ pytest.importorskip("panel", reason="the extra page is not installed")
 
 from asperity.app.contact_result import OPEN, ContactMaps
 from asperity.app.map_images import DIFFERS, MapImages
+from asperity.app.speed_curve import SpeedCurve
+from asperity.paper import papers_case
 
 HALF_WIDTHS = (50e-6, 40e-6)
 
@@ -42,3 +45,29 @@ def test_films_are_subtracted_on_equal_cells_only(pinned):
     assert DIFFERS in images.change.children[0].text
     images.show(shown, None)
     assert not images.change.visible
+
+
+def drawn_curve(sliding_ratio, friction):
+    """Return the Stribeck curve of a contact whose points are never solved."""
+    queue = SimpleNamespace(busy=True)
+    curve = SpeedCurve(queue, lambda: False)
+    curve.create()
+    case = papers_case().with_written({"contact.slip": sliding_ratio})
+    curve.follow(case, SimpleNamespace(row={"friction_coefficient": friction}))
+    return curve
+
+
+def test_without_sliding_a_sentence_replaces_the_stribeck_curve():
+    curve = drawn_curve(0.0, 0.0)
+    assert not curve.figure.visible
+    assert "nothing slides" in curve.model.children[0].text
+    assert curve.model.min_height == 0
+
+
+def test_the_axes_of_a_stribeck_curve_hold_the_working_point_and_all_speeds():
+    curve = drawn_curve(0.2, 0.1163)
+    figure = curve.figure
+    assert figure.visible
+    assert figure.title.text == "Stribeck curve, 0 of 9 points"
+    assert (figure.y_range.start, figure.y_range.end) == (0.0, pytest.approx(1.15 * 0.1163))
+    assert figure.x_range.start < 0.191 < 19.1 < figure.x_range.end

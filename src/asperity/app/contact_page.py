@@ -114,14 +114,13 @@ class ContactView:
         self.maps = MapImages()
         self.spectrum = placeholder(SPECTRUM_HEIGHT)
         self.share, self.resonance = placeholder(TRIALS_HEIGHT), placeholder(TRIALS_HEIGHT)
-        self.stribeck = placeholder(TRIALS_HEIGHT)
         self._spectrum: SpectrumFigure | None = None
         self._trials: TrialFigures | None = None
         self._pending_figures = [
             *self.maps.steps(),
             self._make_spectrum,
             self._make_trials,
-            self._make_speeds,
+            self.speeds.create,
         ]
         self.status, self.verdict, self.notes, self.message = (text_block() for _ in range(4))
         self.tiles = text_block(TILE_STYLES)
@@ -275,9 +274,6 @@ class ContactView:
         self.share.children, self.resonance.children = [self._trials.share], [self._trials.crf]
         self._draw_trials()
 
-    def _make_speeds(self) -> None:
-        self.stribeck.children = [self.speeds.create()]
-
     def _draw_spectrum(self) -> None:
         result = self.session.result
         pinned = self.session.pinned
@@ -418,7 +414,7 @@ def layout(view: ContactView) -> Layout:
         "change": view.maps.change,
         "cut": Column(view.maps.cut_pressure, view.maps.cut_film, sizing_mode="stretch_width"),
         "spectrum": view.spectrum,
-        "stribeck": view.stribeck,
+        "stribeck": view.speeds.model,
         "sound": view.sound.model,
         "share": view.share,
         "resonance": view.resonance,
