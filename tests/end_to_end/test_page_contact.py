@@ -203,8 +203,10 @@ def test_a_wrong_value_is_reported_at_its_slider(visit):
     below, above = message.bounding_box(), box.bounding_box()
     assert 0 < below["y"] - above["y"] < 120
     expect(page.locator(".block.film")).not_to_have_css("opacity", "1")
+    expect(page.locator(".block.verdict")).to_contain_text("Previous result: ")
     set_slider(page, "Composite roughness, Sq", "1 um")
     message.wait_for(state="hidden")
+    expect(page.locator(".block.verdict")).not_to_contain_text("Previous result: ")
     expect(page.locator(".block.film")).to_have_css("opacity", "1")
 
 

@@ -104,6 +104,7 @@ class ContactView:
         self._built: Case | MachineCase | None = None
         self._more = False
         self._drawn: tuple[ContactResult, ContactResult | None] | None = None
+        self._judged: ContactResult | None = None  # latest result with a verdict
         self._create_outputs()
         self._create_controls()
         self._build_knobs()
@@ -221,6 +222,7 @@ class ContactView:
             if (session.result, session.pinned) != self._drawn:
                 self._draw_result(session.result, session.pinned)
                 self._drawn = (session.result, session.pinned)
+            self._draw_verdict()
         self.pin.label = "Unpin" if session.pinned is not None else "Pin to compare"
         notice = "Loading the solver (the first time, it is also compiled). " if loading else ""
         self.status.text = sentences(
@@ -251,11 +253,18 @@ class ContactView:
             )
         self.strip.show(html, busy=loading)
 
+    def _draw_verdict(self) -> None:
+        """Draw the latest verdict; it is marked while other values are solved or invalid."""
+        if self._judged is not None:
+            mark = "Previous result: " if self.session.stale else ""
+            kind = "" if self._judged.converged else "alarm"
+            self.verdict.text = sentences([f"{mark}{self._judged.verdict}"], kind)
+
     def _draw_result(self, result: ContactResult, pinned: ContactResult | None) -> None:
         self.maps.show(result, pinned)
         if result.coarse:
             return
-        self.verdict.text = sentences([result.verdict], "" if result.converged else "alarm")
+        self._judged = result
         self.notes.text = notes(result.notes)
         self._draw_spectrum()
         self._draw_trials()
