@@ -71,3 +71,13 @@ def test_the_axes_of_a_stribeck_curve_hold_the_working_point_and_all_speeds():
     assert figure.title.text == "Stribeck curve, 0 of 9 points"
     assert (figure.y_range.start, figure.y_range.end) == (0.0, pytest.approx(1.15 * 0.1163))
     assert figure.x_range.start < 0.191 < 19.1 < figure.x_range.end
+
+
+def test_maps_of_one_instant_state_their_own_contact_area():
+    images = MapImages()
+    images.make()
+    title = images.film.children[0].title
+    images.show(replace(contact_maps(), instant_area=0.086))
+    assert title.text == "Film thickness at one instant, CAR 8.6 %"
+    images.show(contact_maps())
+    assert title.text == "Film thickness, contact and cavitation"

@@ -15,7 +15,7 @@ from asperity.app.contact_jobs import (
     make_report,
     open_surface,
 )
-from asperity.app.contact_result import ContactResult
+from asperity.app.contact_result import ContactResult, spectrum_title
 from asperity.app.contact_tools import Sound, link_button, picture_button
 from asperity.app.figures import SPECTRUM_HEIGHT, TRIALS_HEIGHT, SpectrumFigure, TrialFigures
 from asperity.app.jobs import JobQueue, VisitPool
@@ -51,7 +51,6 @@ from asperity.app.widgets import (
     tiles,
 )
 from asperity.case import Case, MachineCase
-from asperity.core.quantities import quantity
 
 LINK_NOTE = "The link to this page remains valid while the server runs."
 SURFACE_LIMIT = 300_000_000  # bytes of a measured surface
@@ -290,7 +289,7 @@ class ContactView:
             self._spectrum.show(
                 result.spectrum,
                 None if pinned is None else pinned.spectrum,
-                _spectrum_title(result),
+                spectrum_title(result),
             )
 
     def _draw_trials(self) -> None:
@@ -388,20 +387,6 @@ class ContactView:
             self._show_message(result.message)
         else:
             self.download.offer(export.REPORT, "text/html", str(result))
-
-
-def _spectrum_title(result: ContactResult) -> str:
-    """Return the title of the spectrum: the resonance, or why there is none."""
-    spectrum = result.spectrum
-    if spectrum is None:
-        return "No vibration requested"
-    if spectrum.crf_hz is None:
-        return f"No contact resonance: {spectrum.reason}"
-    crf = quantity("crf_hz")
-    fitted = (
-        f", fitted to ± {crf.text(spectrum.crf_std_hz)}" if spectrum.crf_std_hz is not None else ""
-    )
-    return f"{crf.named(spectrum.crf_hz)}{fitted}"
 
 
 def layout(view: ContactView) -> Layout:
