@@ -9,7 +9,10 @@ import pytest
 pytest.importorskip("panel", reason="the extra page is not installed")
 
 from asperity.app.contact_result import OPEN, ContactMaps
+from asperity.app.contact_tools import Picture
 from asperity.app.map_images import DIFFERS, MapImages
+from asperity.app.presets import preset_case
+from asperity.app.settings import Settings
 from asperity.app.speed_curve import SpeedCurve
 from asperity.paper import papers_case
 
@@ -81,3 +84,13 @@ def test_maps_of_one_instant_state_their_own_contact_area():
     assert title.text == "Film thickness at one instant, CAR 8.6 %"
     images.show(contact_maps())
     assert title.text == "Film thickness, contact and cavitation"
+
+
+def test_a_picture_names_case_and_inputs():
+    picture = Picture()
+    settings = Settings(preset_case("nu206"), preset="nu206")
+    picture.show(settings.with_value("machine.radial_load", "5 kN"))
+    data = picture.button.js_event_callbacks["button_click"][0].args["source"].data
+    assert data["head"][0][0] == "NU 206 bearing, changed"
+    inputs = dict(zip(data["names"][0], data["values"][0], strict=True))
+    assert (inputs["Radial load"], inputs["Oil temperature, T"]) == ("5 kN", "80 °C")

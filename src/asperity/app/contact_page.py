@@ -16,7 +16,7 @@ from asperity.app.contact_jobs import (
     open_surface,
 )
 from asperity.app.contact_result import ContactResult, spectrum_title
-from asperity.app.contact_tools import Sound, link_button, picture_button
+from asperity.app.contact_tools import Picture, Sound, link_button
 from asperity.app.figures import SPECTRUM_HEIGHT, TRIALS_HEIGHT, SpectrumFigure, TrialFigures
 from asperity.app.jobs import JobQueue, VisitPool
 from asperity.app.machine_drawing import MachineDrawing
@@ -95,7 +95,7 @@ class ContactView:
         self.session = ContactSession(settings, coarse, self.draw, full)
         self._side_jobs = JobQueue(worker_pool, deliver)
         self.drawing = MachineDrawing(worker_pool, deliver, tools.draw_machine)
-        self.sound = Sound()
+        self.sound, self.picture = Sound(), Picture()
         self.speeds = SpeedCurve(
             JobQueue(worker_pool, deliver, solves=True), lambda: not self.session.pending
         )
@@ -153,7 +153,7 @@ class ContactView:
             self.sound.button,
             self.pin,
             link_button(),
-            picture_button(),
+            self.picture.button,
             button("Case file", self._give_case),
             button("Python script", self._give_script),
             self.report,
@@ -261,6 +261,8 @@ class ContactView:
 
     def _draw_result(self, result: ContactResult, pinned: ContactResult | None) -> None:
         self.maps.show(result, pinned)
+        if result.text == self.session.settings.case.text:
+            self.picture.show(self.session.settings)
         if result.coarse:
             return
         self._judged = result
