@@ -391,4 +391,5 @@ def test_nothing_is_wider_than_the_window(browser, server, width):
     visit = Visit(browser, server, viewport={"width": width, "height": 900})
     page = visit.solved()
     assert page.evaluate("() => document.documentElement.scrollWidth") <= width
+    assert page.locator("header").bounding_box()["height"] < 60  # one line
     visit.close()

@@ -81,7 +81,7 @@ def test_maps_of_one_instant_state_their_own_contact_area():
     images.make()
     title = images.film.children[0].title
     images.show(replace(contact_maps(), instant_area=0.086))
-    assert title.text == "Film thickness at one instant, CAR 8.6 %"
+    assert title.text == "Film at one instant, CAR 8.6 %"
     images.show(contact_maps())
     assert title.text == "Film thickness, contact and cavitation"
 

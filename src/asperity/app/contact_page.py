@@ -31,6 +31,7 @@ from asperity.app.widgets import (
     CHIP,
     CHOSEN,
     DROP,
+    FADE,
     HEADLINE,
     INHERIT,
     LOOK,
@@ -147,6 +148,7 @@ class ContactView:
         }
         self.presets = button_row(*self._chips.values())
         self.presets.styles = {"flex-wrap": "nowrap", "overflow-x": "auto"}
+        self.presets.stylesheets = [INHERIT, FADE]
         self.pin = button("Pin to compare", self._pin)
         self.report = button("Report", self._make_report)
         self.buttons = button_row(

@@ -179,7 +179,7 @@ class MapFigures:
         """Set the titles: one instant, with its contact area, or the solution of the numbers."""
         film, pressure = FILM_TITLE, PRESSURE_TITLE
         if area is not None:
-            film = f"Film thickness at one instant, {quantity('car').named(area)}"
+            film = f"Film at one instant, {quantity('car').named(area)}"
             pressure = "Pressure at the same instant"
         self.film.title.text, self.pressure.title.text = film, pressure
 

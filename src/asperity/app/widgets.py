@@ -51,6 +51,7 @@ Layout: TypeAlias = tuple[dict[str, object], list[PageSection]]
 LOOK = """
 :host { color: var(--ink); font: inherit; }
 .bk-clearfix { display: block; width: 100%; }
+.bk-clearfix:empty { display: none !important; }
 .bk-input { color: var(--ink); background: var(--paper); border: 1px solid var(--line);
   border-radius: 4px; }
 .bk-input, .bk-btn { font: inherit; }
@@ -83,6 +84,11 @@ img { display: block; width: 100%; height: auto; background: #fff; border-radius
 p { margin: 4px 0 0; font-size: .8rem; color: var(--soft); }
 """
 CHIP = ".bk-btn { border-radius: 99px; padding: 3px 12px; white-space: nowrap; font-size: .9rem; }"
+# on narrow screens: fades the right end of a row, as a hint that it scrolls
+FADE = """
+@media (max-width: 760px) { :host { padding-right: 36px;
+  mask-image: linear-gradient(90deg, #000 calc(100% - 48px), transparent); } }
+"""
 CHOSEN = ".bk-btn { border-color: var(--accent); box-shadow: inset 0 0 0 1px var(--accent); }"
 WRONG = ".bk-input { border-color: var(--alarm); border-width: 2px; }"
 SENTENCE = """
