@@ -191,4 +191,6 @@ def test_an_empty_page_of_recordings_offers_an_example(browser, tmp_path):
         page.get_by_text("12 recordings read").wait_for()
         page.get_by_text(re.compile("Severe wear from")).wait_for()
         expect(page.get_by_role("img", name="Contact resonance over the series")).to_be_visible()
+        axes = "[...Bokeh.index.query(view => view.model.type === 'LinearAxis')]"
+        assert "Sq [µm]" in page.evaluate(f"() => {axes}.map(view => view.model.axis_label)")
         visit.close()

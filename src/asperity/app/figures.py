@@ -76,8 +76,8 @@ def plain_figure(
     return plot
 
 
-def _key_above(plot: Plot) -> LegendItem:
-    """Move the legend above the figure; hide and return its last entry."""
+def legend_above(plot: Plot) -> Plot:
+    """Move the legend above the figure; return it."""
     legend = plot.legend[0]
     plot.center.remove(legend)
     plot.add_layout(legend, "above")
@@ -89,8 +89,14 @@ def _key_above(plot: Plot) -> LegendItem:
         padding=0,
         label_text_color=TYPE,
     )
-    legend.items[-1].visible = False
-    return legend.items[-1]
+    return legend
+
+
+def _key_above(plot: Plot) -> LegendItem:
+    """Move the legend above the figure; hide and return its last entry."""
+    item = legend_above(plot).items[-1]
+    item.visible = False
+    return item
 
 
 class MapFigures:
