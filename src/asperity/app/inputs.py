@@ -65,6 +65,10 @@ GRID = "Grid"
 MODEL = "Model"
 SECOND = "Roughness of the second body"
 PRESETS = ("sound", "paper")
+GRID_MEANING = (
+    "cells along and across rolling for standing roughness. Running roughness has a grid of its "
+    "own with at most these cells, about 3200 in all, chosen from the correlation lengths"
+)
 _SURFACE: dict[str, InputSpec] = {
     "sq": InputSpec("sq_m", ROUGHNESS),
     "correlation_length.0": InputSpec("correlation_length_x_m", ROUGHNESS),
@@ -125,7 +129,7 @@ INPUT_SPECS: dict[str, InputSpec] = {
     "vibration.stiffness_law": _law("Stiffness law", VIBRATION, STIFFNESS_LAWS),
     "vibration.excitation": _law("Excitation", VIBRATION, EXCITATIONS),
     "vibration.patch": _law("Contact patch", VIBRATION, CONTACT_PATCHES),
-    "grid.cells": InputSpec("grid_cells", GRID),
+    "grid.cells": InputSpec("grid_cells", GRID, meaning=GRID_MEANING),
 }
 
 
@@ -159,8 +163,10 @@ class CaseInput:
     @property
     def hint(self) -> str:
         """Text of the tooltip: meaning, range of the slider, and key of the case file."""
-        low, high = (shown(self.value_text(end)) for end in self.positions)
         meaning = f"{self.meaning[:1].upper()}{self.meaning[1:]}. " if self.meaning else ""
+        if self.choices:
+            return f"{meaning}Case file: {self.key}"
+        low, high = (shown(self.value_text(end)) for end in self.positions)
         return f"{meaning}Slider: {low} to {high}; type any other value. Case file: {self.key}"
 
     @property

@@ -210,6 +210,7 @@ class InputWidget:
                 title=title,
                 value=case_input.text,
                 options=list(case_input.choices),
+                description=self._tooltip() if case_input.meaning else None,
                 **self._style(),
             )
             self.text.on_change("value", self._typed)
@@ -218,9 +219,7 @@ class InputWidget:
             self.text = TextInput(
                 title=title,
                 value=shown(case_input.text),
-                description=Tooltip(
-                    content=case_input.hint, position="bottom_center", stylesheets=[TOOLTIP]
-                ),
+                description=self._tooltip(),
                 **self._style(),
             )
             self.text.on_change("value", self._typed)
@@ -248,6 +247,11 @@ class InputWidget:
             margin=(0, 0, 4, 0),
             spacing=2,
             stylesheets=[INHERIT],
+        )
+
+    def _tooltip(self) -> Tooltip:
+        return Tooltip(
+            content=self.case_input.hint, position="bottom_center", stylesheets=[TOOLTIP]
         )
 
     @staticmethod
