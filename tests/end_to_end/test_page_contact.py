@@ -197,7 +197,7 @@ def test_a_wrong_value_is_reported_at_its_slider(visit):
     page = visit.solved()
     box = set_slider(page, "Composite roughness, Sq", "2")
     message = page.get_by_text(
-        'surface.sq must be a length such as "5.4 mm", got the bare number 2'
+        'Composite roughness, Sq must be a length such as "5.4 mm", got the bare number 2'
     )
     message.wait_for()
     below, above = message.bounding_box(), box.bounding_box()

@@ -225,5 +225,6 @@ class ContactSession:
         self._changed()
 
     def _fail(self, failure: JobFailure) -> None:
-        self.problem, self.pending, self.stored = failure.message, False, ""
+        self.problem = self.settings.failure(failure.message)
+        self.pending, self.stored = False, ""
         self._changed()
