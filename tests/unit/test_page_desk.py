@@ -141,6 +141,7 @@ def test_the_spectrum_is_that_of_the_run_around_its_band(run, result):
 
 
 def test_titles_of_the_settings_fit_on_a_phone(result):
+    pytest.importorskip("panel")
     from asperity.app.figures import TrialFigures
 
     trials = TrialFigures(lambda _: None)
