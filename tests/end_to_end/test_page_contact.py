@@ -197,14 +197,16 @@ def test_a_wrong_value_is_reported_at_its_slider(visit):
     page = visit.solved()
     box = set_slider(page, "Composite roughness, Sq", "2")
     message = page.get_by_text(
-        'surface.sq must be a length such as "5.4 mm", got the bare number 2'
+        'Composite roughness, Sq must be a length such as "5.4 mm", got the bare number 2'
     )
     message.wait_for()
     below, above = message.bounding_box(), box.bounding_box()
     assert 0 < below["y"] - above["y"] < 120
     expect(page.locator(".block.film")).not_to_have_css("opacity", "1")
+    expect(page.locator(".block.verdict")).to_contain_text("Previous result: ")
     set_slider(page, "Composite roughness, Sq", "1 um")
     message.wait_for(state="hidden")
+    expect(page.locator(".block.verdict")).not_to_contain_text("Previous result: ")
     expect(page.locator(".block.film")).to_have_css("opacity", "1")
 
 
@@ -389,4 +391,5 @@ def test_nothing_is_wider_than_the_window(browser, server, width):
     visit = Visit(browser, server, viewport={"width": width, "height": 900})
     page = visit.solved()
     assert page.evaluate("() => document.documentElement.scrollWidth") <= width
+    assert page.locator("header").bounding_box()["height"] < 60  # one line
     visit.close()

@@ -111,17 +111,18 @@ def test_regime_and_load_share_stay_visible_while_any_knob_turns(browser, server
 def test_every_question_mark_has_a_tooltip(visit):
     page = visit.solved()
     marks = page.locator(".bk-description").all()
-    assert len(marks) == 12
+    assert len(marks) == 13
     texts = set()
     for mark in marks:
         mark.scroll_into_view_if_needed()
         mark.hover()
         tooltip = page.locator(".bk-tooltip-content:visible")
-        expect(tooltip).to_contain_text("Slider: ")
+        expect(tooltip).to_contain_text("Case file: ")
         texts.add(tooltip.inner_text())
         page.mouse.move(0, 0)
         expect(tooltip).to_have_count(0)
-    assert len(texts) == 12
+    assert len(texts) == 13
+    assert any("Running roughness has a grid of its own" in text for text in texts)
 
 
 @pytest.mark.parametrize(("name", "value"), WRONG, ids=[name for name, _ in WRONG])

@@ -185,9 +185,12 @@ def test_an_empty_page_of_recordings_offers_an_example(browser, tmp_path):
         visit = Visit(browser, server)
         page = visit.go("recordings")
         page.get_by_text(re.compile("^Drop recordings .* or try an example")).wait_for()
+        expect(page.locator("footer")).to_have_text(re.compile(r"^asperity \S+$"))
         assert page.get_by_role("img").count() == 0  # no empty frames
         page.get_by_role("button", name="Try an example").click()
         page.get_by_text("12 recordings read").wait_for()
         page.get_by_text(re.compile("Severe wear from")).wait_for()
         expect(page.get_by_role("img", name="Contact resonance over the series")).to_be_visible()
+        axes = "[...Bokeh.index.query(view => view.model.type === 'LinearAxis')]"
+        assert "Sq [µm]" in page.evaluate(f"() => {axes}.map(view => view.model.axis_label)")
         visit.close()

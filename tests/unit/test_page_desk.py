@@ -20,6 +20,7 @@ from asperity.app.contact_result import (
     TOUCHING,
     difference,
     result_of_run,
+    spectrum_title,
 )
 from asperity.app.opening import open_page
 from asperity.app.session import ContactSession
@@ -141,11 +142,10 @@ def test_the_spectrum_is_that_of_the_run_around_its_band(run, result):
 
 def test_titles_of_the_settings_fit_on_a_phone(result):
     pytest.importorskip("panel")
-    from asperity.app.contact_page import _spectrum_title
     from asperity.app.figures import TrialFigures
 
     trials = TrialFigures(lambda _: None)
-    titles = [_spectrum_title(result), trials.share.title.text, trials.crf.title.text]
+    titles = [spectrum_title(result), trials.share.title.text, trials.crf.title.text]
     assert titles[0].startswith("CRF ")
     assert f"fitted to ± {result.spectrum.crf_std_hz:.1f} Hz" in titles[0]
     assert max(map(len, titles)) <= 36  # of 390 pixels
@@ -348,8 +348,16 @@ def test_a_numerical_overflow_is_reported_in_one_sentence():
 def test_a_grid_too_small_for_the_load_is_reported():
     session, _, _ = session_of()
     session.change("surface.correlation_length.0", "3 um")
-    assert session.status.startswith("Not solved: paper.toml: surface: ")
+    assert session.status.startswith("Not solved: surface: correlation length")
     assert session.result is None
+
+
+def test_a_value_far_beyond_its_slider_is_named_as_too_large():
+    session, _, _ = session_of()
+    session.change("contact.load", "1e9 N")
+    assert session.status == (
+        "Not solved: Normal load, F: 1e9 N is too large to be solved here; choose 50 N to 5000 N."
+    )
 
 
 def test_a_pinned_result_stays_for_comparison():

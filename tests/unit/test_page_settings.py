@@ -94,21 +94,21 @@ def test_cells_are_accepted_in_usual_notations(settings):
         (
             "contact.load",
             "800",
-            'contact.load must be a force such as "500 N", got the bare number 800',
+            'Normal load, F must be a force such as "500 N", got the bare number 800',
         ),
-        ("contact.load", "-5 N", "contact.load must be positive and finite"),
-        ("surface.sq", "2 mm2", "surface.sq must be a length"),
-        ("surface.correlation_length.0", "x", "surface.correlation_length[0] must be a length"),
+        ("contact.load", "-5 N", "Normal load, F must be positive and finite"),
+        ("surface.sq", "2 mm2", "Composite roughness, Sq must be a length"),
+        ("surface.correlation_length.0", "x", "Correlation length along rolling must be a length"),
         (
             "material.boundary_friction",
             "5",
-            "material.boundary_friction must be less than or equal to 2, got 5",
+            "Boundary friction coefficient must be less than or equal to 2, got 5",
         ),
-        ("grid.cells", "1024 x 1024", "grid.cells must be at most 262144 in all on this page"),
+        ("grid.cells", "1024 x 1024", "Grid cells must be at most 262144 in all on this page"),
         ("contact.load", "1" * 300, "value of 300 characters"),
     ],
 )
-def test_an_invalid_value_is_refused_with_the_case_files_message(settings, key, text, message):
+def test_an_invalid_value_is_refused_with_the_name_of_its_input(settings, key, text, message):
     refusal = settings.with_value(key, text)
     assert isinstance(refusal, RejectedValue)
     assert refusal.key == key

@@ -161,4 +161,4 @@ def test_the_folder_of_a_rig_is_read_with_its_table_and_case(tmp_path):
     track = track_recordings([folder], case=opened.case, table=opened.table)
     assert series.verdict == track.verdict()
     assert "Severe wear" in series.verdict
-    assert (series.x_name, len(series.rows)) == ("sq_um", 7)
+    assert (series.x_name, series.x_label, len(series.rows)) == ("sq_um", "Sq [µm]", 7)

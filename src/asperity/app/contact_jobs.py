@@ -191,7 +191,8 @@ def solve_coarsely(ticket: Ticket, case: Case, start: ContactSolution | None) ->
             continue
         solution = _attempt(ticket, case, surface, warm_start, steps)
         if solution is not None:
-            result = coarse_result(solution, case.text, time.perf_counter() - begin)
+            seconds = time.perf_counter() - begin
+            result = coarse_result(solution, case.text, seconds, moving=case.is_running)
             return CoarseResult(result, solution)
     return CoarseResult(None, None)
 

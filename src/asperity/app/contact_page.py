@@ -15,8 +15,8 @@ from asperity.app.contact_jobs import (
     make_report,
     open_surface,
 )
-from asperity.app.contact_result import ContactResult
-from asperity.app.contact_tools import Sound, link_button, picture_button
+from asperity.app.contact_result import ContactResult, spectrum_title
+from asperity.app.contact_tools import Picture, Sound, link_button
 from asperity.app.figures import SPECTRUM_HEIGHT, TRIALS_HEIGHT, SpectrumFigure, TrialFigures
 from asperity.app.jobs import JobQueue, VisitPool
 from asperity.app.machine_drawing import MachineDrawing
@@ -31,6 +31,7 @@ from asperity.app.widgets import (
     CHIP,
     CHOSEN,
     DROP,
+    FADE,
     HEADLINE,
     INHERIT,
     LOOK,
@@ -51,7 +52,6 @@ from asperity.app.widgets import (
     tiles,
 )
 from asperity.case import Case, MachineCase
-from asperity.core.quantities import quantity
 
 LINK_NOTE = "The link to this page remains valid while the server runs."
 SURFACE_LIMIT = 300_000_000  # bytes of a measured surface
@@ -96,7 +96,7 @@ class ContactView:
         self.session = ContactSession(settings, coarse, self.draw, full)
         self._side_jobs = JobQueue(worker_pool, deliver)
         self.drawing = MachineDrawing(worker_pool, deliver, tools.draw_machine)
-        self.sound = Sound()
+        self.sound, self.picture = Sound(), Picture()
         self.speeds = SpeedCurve(
             JobQueue(worker_pool, deliver, solves=True), lambda: not self.session.pending
         )
@@ -104,6 +104,7 @@ class ContactView:
         self._built: Case | MachineCase | None = None
         self._more = False
         self._drawn: tuple[ContactResult, ContactResult | None] | None = None
+        self._judged: ContactResult | None = None  # latest result with a verdict
         self._create_outputs()
         self._create_controls()
         self._build_knobs()
@@ -114,14 +115,13 @@ class ContactView:
         self.maps = MapImages()
         self.spectrum = placeholder(SPECTRUM_HEIGHT)
         self.share, self.resonance = placeholder(TRIALS_HEIGHT), placeholder(TRIALS_HEIGHT)
-        self.stribeck = placeholder(TRIALS_HEIGHT)
         self._spectrum: SpectrumFigure | None = None
         self._trials: TrialFigures | None = None
         self._pending_figures = [
             *self.maps.steps(),
             self._make_spectrum,
             self._make_trials,
-            self._make_speeds,
+            self.speeds.create,
         ]
         self.status, self.verdict, self.notes, self.message = (text_block() for _ in range(4))
         self.tiles = text_block(TILE_STYLES)
@@ -148,13 +148,14 @@ class ContactView:
         }
         self.presets = button_row(*self._chips.values())
         self.presets.styles = {"flex-wrap": "nowrap", "overflow-x": "auto"}
+        self.presets.stylesheets = [INHERIT, FADE]
         self.pin = button("Pin to compare", self._pin)
         self.report = button("Report", self._make_report)
         self.buttons = button_row(
             self.sound.button,
             self.pin,
             link_button(),
-            picture_button(),
+            self.picture.button,
             button("Case file", self._give_case),
             button("Python script", self._give_script),
             self.report,
@@ -222,6 +223,7 @@ class ContactView:
             if (session.result, session.pinned) != self._drawn:
                 self._draw_result(session.result, session.pinned)
                 self._drawn = (session.result, session.pinned)
+            self._draw_verdict()
         self.pin.label = "Unpin" if session.pinned is not None else "Pin to compare"
         notice = "Loading the solver (the first time, it is also compiled). " if loading else ""
         self.status.text = sentences(
@@ -252,11 +254,20 @@ class ContactView:
             )
         self.strip.show(html, busy=loading)
 
+    def _draw_verdict(self) -> None:
+        """Draw the latest verdict; it is marked while other values are solved or invalid."""
+        if self._judged is not None:
+            mark = "Previous result: " if self.session.stale else ""
+            kind = "" if self._judged.converged else "alarm"
+            self.verdict.text = sentences([f"{mark}{self._judged.verdict}"], kind)
+
     def _draw_result(self, result: ContactResult, pinned: ContactResult | None) -> None:
         self.maps.show(result, pinned)
+        if result.text == self.session.settings.case.text:
+            self.picture.show(self.session.settings)
         if result.coarse:
             return
-        self.verdict.text = sentences([result.verdict], "" if result.converged else "alarm")
+        self._judged = result
         self.notes.text = notes(result.notes)
         self._draw_spectrum()
         self._draw_trials()
@@ -275,9 +286,6 @@ class ContactView:
         self.share.children, self.resonance.children = [self._trials.share], [self._trials.crf]
         self._draw_trials()
 
-    def _make_speeds(self) -> None:
-        self.stribeck.children = [self.speeds.create()]
-
     def _draw_spectrum(self) -> None:
         result = self.session.result
         pinned = self.session.pinned
@@ -285,7 +293,7 @@ class ContactView:
             self._spectrum.show(
                 result.spectrum,
                 None if pinned is None else pinned.spectrum,
-                _spectrum_title(result),
+                spectrum_title(result),
             )
 
     def _draw_trials(self) -> None:
@@ -385,20 +393,6 @@ class ContactView:
             self.download.offer(export.REPORT, "text/html", str(result))
 
 
-def _spectrum_title(result: ContactResult) -> str:
-    """Return the title of the spectrum: the resonance, or why there is none."""
-    spectrum = result.spectrum
-    if spectrum is None:
-        return "No vibration requested"
-    if spectrum.crf_hz is None:
-        return f"No contact resonance: {spectrum.reason}"
-    crf = quantity("crf_hz")
-    fitted = (
-        f", fitted to ± {crf.text(spectrum.crf_std_hz)}" if spectrum.crf_std_hz is not None else ""
-    )
-    return f"{crf.named(spectrum.crf_hz)}{fitted}"
-
-
 def layout(view: ContactView) -> Layout:
     """Return the parts of the page by name, and the sections that contain them."""
     parts = {
@@ -418,7 +412,7 @@ def layout(view: ContactView) -> Layout:
         "change": view.maps.change,
         "cut": Column(view.maps.cut_pressure, view.maps.cut_film, sizing_mode="stretch_width"),
         "spectrum": view.spectrum,
-        "stribeck": view.stribeck,
+        "stribeck": view.speeds.model,
         "sound": view.sound.model,
         "share": view.share,
         "resonance": view.resonance,

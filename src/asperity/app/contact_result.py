@@ -77,6 +77,8 @@ class ContactMaps:
 
     `x` and `y` [m] are cell centres; `gap` [m], `pressure` [Pa] and `cells` (`OPEN`, `TOUCHING`,
     `CAVITATED`) have shape (nx, ny). `gap_top` is the upper end of the colours of the film [m].
+    `instant_area` is the share of the Hertz zone that the maps show in contact, where they are one
+    instant of moving roughness and the numbers are means over time.
     """
 
     x: Field
@@ -89,10 +91,17 @@ class ContactMaps:
     half_widths: tuple[float, float]
     hertz_pressure: float
     endless: bool
+    instant_area: float | None = None
 
     def nearest_row(self, y: float) -> int:
         """Return the row of cells nearest to y [m]."""
         return int(np.argmin(np.abs(self.y - y)))
+
+    def has_cells_of(self, other: "ContactMaps") -> bool:
+        """Return True if both have the same domain and the same number of cells."""
+        return self.gap.shape == other.gap.shape and np.allclose(
+            self.extent, other.extent, rtol=1e-6, atol=0.0
+        )
 
     def hertz(self, row: int) -> Field:
         """Return the Hertz pressure of the smooth, dry contact along a row of cells [Pa]."""
@@ -178,14 +187,20 @@ def result_of_run(run: Run, seconds: float) -> ContactResult:
         regime=run.lubrication,
         verdict=run.verdict(),
         notes=tuple(notes),
+        moving=run.running is not None,
         seconds=seconds,
         spectrum=_resonance_spectrum(run),
         **_sound(run),
     )
 
 
-def coarse_result(solution: ContactSolution, text: str, seconds: float) -> ContactResult:
-    """Return the result of a coarse solution: maps, and numbers that are quick to compute."""
+def coarse_result(
+    solution: ContactSolution, text: str, seconds: float, *, moving: bool
+) -> ContactResult:
+    """Return the result of a coarse solution: maps, and numbers that are quick to compute.
+
+    `moving` is True if the full one will be a mean over time.
+    """
     state: ContactState = contact_state(solution)
     return _build_result(
         solution,
@@ -198,13 +213,14 @@ def coarse_result(solution: ContactSolution, text: str, seconds: float) -> Conta
         regime=lubrication(state.clr, lubricated=solution.lubricant is not None),
         verdict="",
         notes=(),
+        moving=moving,
         seconds=seconds,
         spectrum=None,
     )
 
 
 def _build_result(
-    solution: ContactSolution, text: str, row: Numbers, **fields: Any
+    solution: ContactSolution, text: str, row: Numbers, *, moving: bool, **fields: Any
 ) -> ContactResult:
     maps = map_fields(
         solution.conditions,
@@ -214,6 +230,9 @@ def _build_result(
         solution.in_contact,
         solution.cavitated,
     )
+    if moving:
+        zone = hertz_zone(solution.conditions, solution.grid)
+        maps["instant_area"] = float(solution.in_contact[zone].mean())
     return ContactResult(text=text, row=row, **maps, **fields)
 
 
@@ -296,6 +315,20 @@ def _sound(run: Run) -> Numbers:
 def group_means(values: Field, size: int) -> Field:
     """Return the means of groups of `size` neighbours; an incomplete last group is dropped."""
     return np.asarray(values[: values.size // size * size].reshape(-1, size).mean(axis=1))
+
+
+def spectrum_title(result: ContactResult) -> str:
+    """Return the title of the spectrum: the resonance, or why there is none."""
+    spectrum = result.spectrum
+    if spectrum is None:
+        return "No vibration requested"
+    if spectrum.crf_hz is None:
+        return f"No contact resonance: {spectrum.reason}"
+    crf = quantity("crf_hz")
+    fitted = (
+        f", fitted to ± {crf.text(spectrum.crf_std_hz)}" if spectrum.crf_std_hz is not None else ""
+    )
+    return f"{crf.named(spectrum.crf_hz)}{fitted}"
 
 
 def difference(key: str, value: float | None, pinned: float | None) -> str:

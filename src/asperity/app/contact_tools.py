@@ -1,9 +1,15 @@
 """Tools of the contact page that run in the browser: sound, copy of the link, picture."""
 
+from importlib.metadata import version
+from pathlib import Path
+
 import numpy as np
-from bokeh.models import Button, ColumnDataSource, CustomJS, Div
+from bokeh.models import Button, ColumnDataSource, CustomJS, Div, Model
 
 from asperity.app.contact_result import ContactResult
+from asperity.app.inputs import shown
+from asperity.app.presets import TITLES
+from asperity.app.settings import Settings
 from asperity.app.widgets import LOOK
 from asperity.core.arrays import Field
 
@@ -61,14 +67,34 @@ def link_button() -> Button:
     return _script_button("Copy link", _COPY)
 
 
-def picture_button() -> Button:
-    """Create the button that saves headline and figures as a picture."""
-    return _script_button("PNG", _PICTURE)
+class Picture:
+    """Button that saves headline, figures and inputs as a picture."""
+
+    def __init__(self) -> None:
+        self._source = ColumnDataSource({"head": [], "names": [], "values": []})
+        self.button = _script_button("PNG", _PICTURE, source=self._source)
+
+    def show(self, settings: Settings) -> None:
+        """Set case and inputs, which are those of the shown result."""
+        inputs = settings.inputs.items()
+        self._source.data = {
+            "head": [[_case_name(settings), f"asperity {version('asperity')}"]],
+            "names": [[case_input.title for _, case_input in inputs]],
+            "values": [[shown(settings.text(key)) for key, _ in inputs]],
+        }
 
 
-def _script_button(label: str, code: str) -> Button:
+def _case_name(settings: Settings) -> str:
+    """Return the preset or file of a case, and that it was changed."""
+    name = TITLES.get(settings.preset) or Path(settings.opened.source).name
+    surface = f", surface {settings.dropped}" if settings.dropped else ""
+    changed = ", changed" if settings.changes else ""
+    return f"{name}{surface}{changed}"
+
+
+def _script_button(label: str, code: str, **models: Model) -> Button:
     made = Button(label=label, stylesheets=[LOOK], margin=(4, 8, 4, 0))
-    made.js_on_event("button_click", CustomJS(args={"button": made}, code=code))
+    made.js_on_event("button_click", CustomJS(args={"button": made, **models}, code=code))
     return made
 
 
@@ -115,7 +141,15 @@ const layers = figures.map(view => view.export("png").canvas)
 const scale = devicePixelRatio, margin = 24 * scale, head = 92 * scale
 const width = Math.max(...layers.map(layer => layer.width)) * 2 + 3 * margin
 const rows = [layers.slice(0, 2), layers.slice(2)].filter(row => row.length > 0)
-const heights = rows.map(row => Math.max(...row.map(layer => layer.height)))
+const [headLines = []] = source.data.head, [names = []] = source.data.names
+const [values = []] = source.data.values, step = 18 * scale
+const keys = document.querySelectorAll(".key i")
+const notes = rows.length > 1 ? ["Spectrum: shaded search band, dashed CRF,",
+  "dotted CRF at full load"] : []
+const lineCount = headLines.length + names.length + keys.length + notes.length + 3
+if (rows.length === 1) rows.push([])
+const heights = rows.map((row, number) =>
+  Math.max(...row.map(layer => layer.height), number === 1 ? lineCount * step : 0))
 const canvas = document.createElement("canvas")
 canvas.width = width
 canvas.height = head + heights.reduce((sum, height) => sum + height + margin, margin)
@@ -140,7 +174,41 @@ let top = head
 for (const [number, row] of rows.entries()) {
   let left = margin
   for (const layer of row) { pen.drawImage(layer, left, top); left += layer.width + margin }
+  if (number === 1) describe(left, top)
   top += heights[number] + margin
+}
+function write(text, left, base, width, weight = 400) {
+  pen.font = `${weight} ${13 * scale}px system-ui, sans-serif`
+  pen.fillText(text, left, base, width)
+}
+function describe(left, top) {
+  const room = width - left - margin
+  let base = top + step
+  const next = () => { base += step }
+  for (const [number, text] of headLines.entries()) {
+    write(text, left, base, room, number === 0 ? 700 : 400)
+    next()
+  }
+  next()
+  for (const [number, name] of names.entries()) {
+    write(name, left, base, 0.6 * room)
+    write(values[number], left + 0.64 * room, base, 0.36 * room)
+    next()
+  }
+  next()
+  for (const mark of keys) {
+    const box = 11 * scale, colours = {touching: "#f7dc4a", cavitated: "#5b6b86"}
+    const ink = pen.fillStyle, colour = colours[mark.className]
+    pen.fillStyle = colour ?? ink
+    pen.strokeStyle = ink
+    pen.setLineDash(colour === undefined ? [3 * scale, 2 * scale] : [])
+    if (colour !== undefined) pen.fillRect(left, base - box, box, box)
+    pen.strokeRect(left, base - box, box, box)
+    pen.fillStyle = ink
+    write(mark.nextSibling.textContent, left + 1.6 * box, base, room)
+    next()
+  }
+  for (const text of notes) { write(text, left, base, room); next() }
 }
 canvas.toBlob(blob => {
   const link = document.createElement("a")

@@ -44,6 +44,7 @@ Plot: TypeAlias = Any  # a figure of Bokeh, whose types lack the attributes that
 Array: TypeAlias = Any  # numbers of any shape
 Source: TypeAlias = dict[str, Any]  # columns of a data source by name
 ASPECT_RANGE = (0.9, 2.0)  # of maps, width over height
+FILM_TITLE, PRESSURE_TITLE = "Film thickness, contact and cavitation", "Pressure"
 MAP_SHARE = 0.8  # of a figure's width, the rest being axes
 
 
@@ -75,8 +76,8 @@ def plain_figure(
     return plot
 
 
-def _key_above(plot: Plot) -> LegendItem:
-    """Move the legend above the figure; hide and return its last entry."""
+def legend_above(plot: Plot) -> Plot:
+    """Move the legend above the figure; return it."""
     legend = plot.legend[0]
     plot.center.remove(legend)
     plot.add_layout(legend, "above")
@@ -88,8 +89,14 @@ def _key_above(plot: Plot) -> LegendItem:
         padding=0,
         label_text_color=TYPE,
     )
-    legend.items[-1].visible = False
-    return legend.items[-1]
+    return legend
+
+
+def _key_above(plot: Plot) -> LegendItem:
+    """Move the legend above the figure; hide and return its last entry."""
+    item = legend_above(plot).items[-1]
+    item.visible = False
+    return item
 
 
 class MapFigures:
@@ -101,8 +108,8 @@ class MapFigures:
         self.across, self.along = (
             Span(dimension=dimension, line_dash="dotted") for dimension in ("width", "height")
         )
-        self.film = self._map("Film thickness, contact and cavitation", FILMS, "gap")
-        self.pressure = self._map("Pressure", Inferno256, "pressure")
+        self.film = self._map(FILM_TITLE, FILMS, "gap")
+        self.pressure = self._map(PRESSURE_TITLE, Inferno256, "pressure")
         self.change: Plot | None = None  # created when a contact is pinned
         self.compares = False
 
@@ -153,12 +160,13 @@ class MapFigures:
         return plot
 
     def show(self, result: ContactMaps, pinned: ContactMaps | None) -> None:
-        """Draw a result, and its film minus a pinned one on the same grid (`compares`)."""
+        """Draw a result, and its film minus a pinned one on the same cells (`compares`)."""
         (x0, x1), (y0, y1) = ((to_display("x_m", end) for end in axis) for axis in result.extent)
-        self.compares = pinned is not None and pinned.gap.shape == result.gap.shape
+        self.compares = pinned is not None and result.has_cells_of(pinned)
         if self.compares and self.change is None:
             self.change = self._map("Film minus pinned film", CHANGES, "gap")
         self._set_extent((x0, x1), (y0, y1))
+        self._set_titles(result.instant_area)
         box = {"x": [x0], "y": [y0], "dw": [x1 - x0], "dh": [y1 - y0]}
         gap = to_display("gap", result.gap)
         top = to_display("gap", result.gap_top) or 1.0
@@ -172,6 +180,14 @@ class MapFigures:
             plot.tags[0]["zone"].data = zone
         if self.compares and pinned is not None:
             self._fill_change(to_display("gap", result.gap - pinned.gap), box)
+
+    def _set_titles(self, area: float | None) -> None:
+        """Set the titles: one instant, with its contact area, or the solution of the numbers."""
+        film, pressure = FILM_TITLE, PRESSURE_TITLE
+        if area is not None:
+            film = f"Film at one instant, {quantity('car').named(area)}"
+            pressure = "Pressure at the same instant"
+        self.film.title.text, self.pressure.title.text = film, pressure
 
     def _fill_change(self, change: Array, box: Source) -> None:
         limit = float(np.percentile(np.abs(change), 98.0)) or 1.0

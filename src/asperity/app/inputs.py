@@ -65,6 +65,10 @@ GRID = "Grid"
 MODEL = "Model"
 SECOND = "Roughness of the second body"
 PRESETS = ("sound", "paper")
+GRID_MEANING = (
+    "cells along and across rolling for standing roughness. Running roughness has a grid of its "
+    "own with at most these cells, about 3200 in all, chosen from the correlation lengths"
+)
 _SURFACE: dict[str, InputSpec] = {
     "sq": InputSpec("sq_m", ROUGHNESS),
     "correlation_length.0": InputSpec("correlation_length_x_m", ROUGHNESS),
@@ -125,7 +129,7 @@ INPUT_SPECS: dict[str, InputSpec] = {
     "vibration.stiffness_law": _law("Stiffness law", VIBRATION, STIFFNESS_LAWS),
     "vibration.excitation": _law("Excitation", VIBRATION, EXCITATIONS),
     "vibration.patch": _law("Contact patch", VIBRATION, CONTACT_PATCHES),
-    "grid.cells": InputSpec("grid_cells", GRID),
+    "grid.cells": InputSpec("grid_cells", GRID, meaning=GRID_MEANING),
 }
 
 
@@ -159,8 +163,10 @@ class CaseInput:
     @property
     def hint(self) -> str:
         """Text of the tooltip: meaning, range of the slider, and key of the case file."""
-        low, high = (shown(self.value_text(end)) for end in self.positions)
         meaning = f"{self.meaning[:1].upper()}{self.meaning[1:]}. " if self.meaning else ""
+        if self.choices:
+            return f"{meaning}Case file: {self.key}"
+        low, high = (shown(self.value_text(end)) for end in self.positions)
         return f"{meaning}Slider: {low} to {high}; type any other value. Case file: {self.key}"
 
     @property
@@ -246,21 +252,36 @@ class CaseInput:
             return f"{value:.6g} {self._amount[1]}"
         return str(round(value)) if isinstance(self.written, int) else f"{round(value, 6):g}"
 
-    def position(self, text: str) -> int | None:
-        """Return the slider position nearest to a written value; None for an unsuitable unit."""
+    def _steps(self, text: str) -> float | None:
+        """Return the slider steps to a written value, which may lie beyond the slider."""
         try:
             value = float(split_amount(text, self._amount[1])[0])
         except BadInput:
             return None
-        first, last = self.positions
         if self._linear:
             low, _, step = self.ends
-            steps = (value - low) / step
-        else:
-            if not value > 0.0:
-                return None
-            steps = PER_DECADE * math.log10(value / self._amount[0])
+            return (value - low) / step
+        return PER_DECADE * math.log10(value / self._amount[0]) if value > 0.0 else None
+
+    def position(self, text: str) -> int | None:
+        """Return the slider position nearest to a written value; None for an unsuitable unit."""
+        steps = self._steps(text)
+        if steps is None:
+            return None
+        first, last = self.positions
         return max(first, min(last, round(steps)))
+
+    def beyond(self, text: str) -> str:
+        """Return a sentence on a written value beyond the slider; empty for others."""
+        steps = None if self.choices else self._steps(text)
+        first, last = self.positions if steps is not None else (0, 0)
+        if steps is None or first <= round(steps) <= last:
+            return ""
+        size = "large" if steps > last else "small"
+        low, high = (shown(self.value_text(end)) for end in (first, last))
+        return (
+            f"{self.title}: {shown(text)} is too {size} to be solved here; choose {low} to {high}."
+        )
 
 
 def shown(text: str) -> str:

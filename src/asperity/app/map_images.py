@@ -9,7 +9,10 @@ from bokeh.models import Column
 
 from asperity.app.contact_result import ContactMaps
 from asperity.app.figures import HEIGHT, SECTION_HEIGHT, MapFigures, SectionFigures
+from asperity.app.widgets import sentences, text_block
 from asperity.core.quantities import quantity
+
+DIFFERS = "No map of the change in film thickness: the domain or grid differs from the pinned one."
 
 
 def placeholder(height: int) -> Column:
@@ -27,6 +30,8 @@ class MapImages:
             placeholder(SECTION_HEIGHT),
             placeholder(SECTION_HEIGHT),
         )
+        self._differs = text_block()
+        self._differs.text = sentences([DIFFERS], "soft")
         self._maps: MapFigures | None = None
         self._cut: SectionFigures | None = None
         self._shown: tuple[ContactMaps, ContactMaps | None] | None = None
@@ -64,10 +69,9 @@ class MapImages:
         if self._maps is None or self._shown is None:
             return
         self._maps.show(*self._shown)
-        change = self._maps.change
-        if change is not None and not self.change.children:
-            self.change.children = [change]
-        self.change.visible = self._maps.compares
+        pinned = self._shown[1]
+        self.change.visible = pinned is not None
+        self.change.children = [self._maps.change] if self._maps.compares else [self._differs]
 
     def _draw_cut(self) -> None:
         if self._maps is None or self._cut is None or self._shown is None:

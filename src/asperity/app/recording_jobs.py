@@ -12,6 +12,7 @@ from asperity.app.contact_result import group_means
 from asperity.case import Case, MachineCase, load_case
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
+from asperity.core.quantities import column_label
 from asperity.monitoring import (
     Track,
     TrackedRecording,
@@ -75,6 +76,7 @@ class RecordingSeries:
     alarm: str
     rows: tuple[dict[str, Any], ...]
     x_name: str
+    x_label: str
     band_hz: tuple[float, float]
     full_load_crf_hz: float | None
     split: float | None
@@ -158,6 +160,7 @@ def series_of_track(track: Track, waiting: int = 0) -> RecordingSeries:
             recording.row() | {"file": Path(recording.file).name} for recording in track.recordings
         ),
         x_name=track.x_name,
+        x_label=column_label(track.x_name),
         band_hz=track.target.band_hz,
         full_load_crf_hz=track.target.full_load_crf_hz,
         split=float(stages.split) if found and stages is not None else None,

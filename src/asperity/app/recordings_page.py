@@ -4,13 +4,17 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import numpy as np
-from bokeh.models import ColumnDataSource, LinearColorMapper, Range1d, Select, Span, TextInput
-from bokeh.palettes import Viridis256
+from bokeh.models import (
+    ColumnDataSource,
+    HoverTool,
+    Select,
+    Span,
+    TextInput,
+)
 from markupsafe import Markup
 
 from asperity.app.contact_jobs import JobFailure
-from asperity.app.figures import BLUE, GREY, VERMILION, plain_figure
+from asperity.app.figures import BLUE, GREY, VERMILION, legend_above, plain_figure
 from asperity.app.jobs import JobQueue, VisitPool
 from asperity.app.recording_jobs import (
     RecordingContext,
@@ -21,6 +25,7 @@ from asperity.app.recording_jobs import (
     track_folder,
 )
 from asperity.app.uploads import FileDrop
+from asperity.app.waterfall import Waterfall
 from asperity.app.widgets import (
     DROP,
     LOOK,
@@ -40,8 +45,8 @@ from asperity.core.errors import BadInput
 from asperity.core.quantities import quantity
 
 RECORDING_LIMIT = 400_000_000  # bytes of a recording
-MAX_LEVEL = 30.0  # dB over the median, upper end of the waterfall's colours
 NO_LINE: dict[str, Sequence[float] | Field] = {"f": [], "s": []}
+TRACK_COLUMNS = ("x", "crf", "low", "high", "colour", "stage", "file")
 COLUMNS = ("crf_hz", "crfa", "damping_ratio", "clr")
 
 
@@ -72,7 +77,7 @@ class RecordingsView:
         self.table = text_block(TABLE)
         self._create_inputs()
         self._build_figures()
-        for part in (self.waterfall, self.track, self.one, self.choice):
+        for part in (self.waterfall.figure, self.track, self.one, self.choice):
             part.visible = False  # until there are recordings
         if folder is None:
             self._tell(
@@ -114,28 +119,9 @@ class RecordingsView:
         self.choice.on_change("value", lambda _name, _old, new: self._show_one(new))
 
     def _build_figures(self) -> None:
-        self._build_waterfall()
+        self.waterfall = Waterfall()
         self._build_track()
         self._build_spectrum()
-
-    def _build_waterfall(self) -> None:
-        self.waterfall = plain_figure(
-            "", "frequency_hz", label="Spectra over the series", title="Spectra", height=320
-        )
-        self.waterfall.xaxis.axis_label = "recording"
-        self._mapper = LinearColorMapper(
-            palette=Viridis256, low=-5.0, high=MAX_LEVEL, nan_color="#00000000"
-        )
-        self._water = ColumnDataSource({"image": [], "x": [], "y": [], "dw": [], "dh": []})
-        self.waterfall.image(
-            "image", "x", "y", "dw", "dh", source=self._water, color_mapper=self._mapper
-        )
-        self._edges = [
-            Span(dimension="width", line_color="white", line_dash="dashed") for _ in range(2)
-        ]
-        for edge in self._edges:
-            self.waterfall.add_layout(edge)
-        self.waterfall.x_range, self.waterfall.y_range = Range1d(0, 1), Range1d(0, 1)
 
     def _build_track(self) -> None:
         self.track = plain_figure(
@@ -146,9 +132,21 @@ class RecordingsView:
             height=320,
             tapped=True,
         )
-        self._line = ColumnDataSource({name: [] for name in ("x", "crf", "low", "high", "colour")})
-        self.track.segment("x", "low", "x", "high", source=self._line, color=GREY)
-        self.track.scatter("x", "crf", source=self._line, size=9, color="colour")
+        self._line = ColumnDataSource({name: [] for name in TRACK_COLUMNS})
+        dots = self.track.scatter(
+            "x", "crf", source=self._line, size=8, color="colour", legend_field="stage"
+        )
+        # ends wider than the dots, to be seen where an interval is narrower than a dot
+        bars: Look = {"source": self._line, "color": GREY, "legend_label": "90 % interval"}
+        self.track.segment("x", "low", "x", "high", **bars)
+        for end in ("low", "high"):
+            self.track.scatter("x", end, marker="dash", size=18, **bars)
+        legend_above(self.track)
+        unit = quantity("crf_hz").display
+        crf = f"@crf{{0.0}} {unit} (90 %: @low{{0.0}} to @high{{0.0}})"
+        self.track.add_tools(
+            HoverTool(renderers=[dots], tooltips=[("CRF", crf), ("recording", "@file")])
+        )
         self._split = Span(
             dimension="height", line_color=VERMILION, line_dash="dashed", visible=False
         )
@@ -164,8 +162,16 @@ class RecordingsView:
             y_axis_type="log",
         )
         self._density, self._curve = (ColumnDataSource({"f": [], "s": []}) for _ in range(2))
-        self.one.line("f", "s", source=self._density, color=GREY)
-        self.one.line("f", "s", source=self._curve, color=VERMILION, line_width=2)
+        self.one.line("f", "s", source=self._density, color=GREY, legend_label="spectrum")
+        self.one.line(
+            "f",
+            "s",
+            source=self._curve,
+            color=VERMILION,
+            line_width=2,
+            legend_label="fitted resonance",
+        )
+        legend_above(self.one)
         self._crf = Span(dimension="height", line_color=BLUE, line_dash="dashed", visible=False)
         self.one.add_layout(self._crf)
 
@@ -289,12 +295,12 @@ class RecordingsView:
     def show(self, series: RecordingSeries) -> None:
         """Draw a series."""
         self.series = series
-        for part in (self.waterfall, self.track, self.one, self.choice):
+        for part in (self.waterfall.figure, self.track, self.one, self.choice):
             part.visible = True
         self.verdict.text = sentences([series.verdict], "alarm" if series.alarm == "alarm" else "")
         self.notes.text = notes(series.notes)
         self.table.text = _table(series)
-        self._draw_waterfall(series)
+        self.waterfall.show(series)
         self._draw_track(series)
         names = [f"{number}: {row['file']}" for number, row in enumerate(series.rows, 1)]
         selected = self.choice.value if self.choice.value in names else names[-1]
@@ -305,21 +311,6 @@ class RecordingsView:
         self._tell(
             f"{len(series.rows)} recordings read{waiting}{watched}."
         )  # last: a screen reader announces it when the page is complete
-
-    def _draw_waterfall(self, series: RecordingSeries) -> None:
-        if not series.levels.size:
-            self._water.data = {"image": [], "x": [], "y": [], "dw": [], "dh": []}
-            return
-        count = len(series.rows)
-        (low, high) = series.band_hz
-        low_hz = float(series.frequency[0])
-        high_hz = float(series.frequency[-1])
-        rectangle = {"x": [0.5], "y": [low_hz], "dw": [count], "dh": [high_hz - low_hz]}
-        self._water.data = {"image": [np.ascontiguousarray(series.levels.T)], **rectangle}
-        self.waterfall.x_range.update(start=0.5, end=count + 0.5)
-        self.waterfall.y_range.update(start=low_hz, end=min(high_hz, 1.6 * high))
-        for edge, end in zip(self._edges, (low, high), strict=True):
-            edge.location = end
 
     def _draw_track(self, series: RecordingSeries) -> None:
         rows = [
@@ -334,9 +325,14 @@ class RecordingsView:
             "low": [value - bar for value, bar in zip(crf, bars, strict=True)],
             "high": [value + bar for value, bar in zip(crf, bars, strict=True)],
             "colour": [VERMILION if row["label"] == "severe" else BLUE for _, row in rows],
+            "stage": [row["label"] or "CRF" for _, row in rows],
+            "file": [row["file"] for _, row in rows],
         }
         self._numbers = [number for number, _ in rows]
-        self.track.xaxis.axis_label = series.x_name
+        self.track.xaxis.axis_label = series.x_label
+        self.track.title.text = (
+            "Contact resonance" if series.split is None else "Resonance; dashed: change point"
+        )
         self._split.update(visible=series.split is not None, location=series.split or 0.0)
 
     def _pick(self, indices: list[int]) -> None:
@@ -394,7 +390,7 @@ def layout(view: RecordingsView) -> Layout:
         "again": view.reread,
         "status": view.status,
         "verdict": view.verdict,
-        "waterfall": view.waterfall,
+        "waterfall": view.waterfall.figure,
         "track": view.track,
         "choice": view.choice,
         "one": view.one,

@@ -80,7 +80,9 @@ class ContactSession:
         if not self.result.converged:
             return f"NOT CONVERGED, do not use: {self.result.explained}"
         nx, ny = self.result.gap.shape
-        return f"Solved on {nx} × {ny} cells in {self.result.seconds:.2f} s"
+        moving = self.result.instant_area is not None
+        kind = ", a grid for running roughness," if moving else ""
+        return f"Solved on {nx} × {ny} cells{kind} in {self.result.seconds:.2f} s"
 
     @property
     def state(self) -> str:
@@ -223,5 +225,6 @@ class ContactSession:
         self._changed()
 
     def _fail(self, failure: JobFailure) -> None:
-        self.problem, self.pending, self.stored = failure.message, False, ""
+        self.problem = self.settings.failure(failure.message)
+        self.pending, self.stored = False, ""
         self._changed()

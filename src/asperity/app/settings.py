@@ -109,8 +109,27 @@ class Settings:
         try:
             _ = settings.case
         except BadInput as error:
-            return RejectedValue(key, text, str(error))
+            return RejectedValue(key, text, self._in_page_words(str(error)))
         return settings
+
+    def failure(self, message: str) -> str:
+        """Return why these settings were not solved, in the words of the page.
+
+        Values beyond their sliders are named first; they explain a refusal of the case.
+        """
+        beyond = [self.inputs[key].beyond(text) for key, text in self.changes.items()]
+        sentences = [sentence for sentence in beyond if sentence]
+        if not sentences or not message.startswith(f"{self.opened.source}: "):
+            sentences.append(self._in_page_words(message))
+        return " ".join(sentences)
+
+    def _in_page_words(self, message: str) -> str:
+        """Replace keys of the case file by titles of inputs, and omit the name of the case."""
+        message = message.replace(f"{self.opened.source}: ", "")
+        for key in sorted(self.inputs, key=len, reverse=True):
+            name = re.escape(re.sub(r"\.(\d+)$", r"[\1]", key))
+            message = re.sub(rf"(?<![\w.]){name}(?![\w.\[])", self.inputs[key].title, message)
+        return message
 
     def remark(self, key: str) -> str:
         """Return a remark on a valid but doubtful value of an input; empty without one."""

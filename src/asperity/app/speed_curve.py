@@ -3,17 +3,20 @@
 from collections.abc import Callable
 
 import numpy as np
-from bokeh.models import ColumnDataSource
+from bokeh.models import ColumnDataSource, Range1d
 
 from asperity.app.contact_jobs import JobFailure, solve_at_speed
 from asperity.app.contact_result import ContactResult
 from asperity.app.figures import BLUE, TRIALS_HEIGHT, VERMILION, Plot, plain_figure, to_display
 from asperity.app.jobs import JobQueue
+from asperity.app.map_images import placeholder
+from asperity.app.widgets import sentences, text_block
 from asperity.case import Case
 from asperity.results import FrictionPoint
 
 SPEED_RANGE, POINTS = 10.0, 9  # range up and down from the speed of the case; number of points
 SPEED = "contact.entrainment_speed"
+MARGIN = 1.15  # of the axes beyond the values
 
 
 class SpeedCurve:
@@ -29,13 +32,16 @@ class SpeedCurve:
         self._queue, self._may_solve = queue, may_solve
         self._case: Case | None = None
         self._contact = ""  # text of the case at a common speed
+        self._slides = False
         self._remaining: list[float] = []
         self.points: list[FrictionPoint] = []
         self._line = ColumnDataSource({"u": [], "mu": [], "low": [], "high": []})
         self._now = ColumnDataSource({"u": [], "mu": []})
         self.figure: Plot | None = None
+        self.model = placeholder(TRIALS_HEIGHT)
+        self._sentence = text_block()  # in place of the figure
 
-    def create(self) -> Plot:
+    def create(self) -> None:
         """Create the figure."""
         self.figure = plain_figure(
             "entrainment_speed_m_s",
@@ -44,6 +50,8 @@ class SpeedCurve:
             title="Stribeck curve",
             x_axis_type="log",
             height=TRIALS_HEIGHT,
+            x_range=Range1d(0.1, 10.0),
+            y_range=Range1d(0.0, 0.1),
         )
         self.figure.segment("u", "low", "u", "high", source=self._line, color=BLUE, alpha=0.5)
         self.figure.line("u", "mu", source=self._line, color=BLUE, line_width=2)
@@ -51,8 +59,8 @@ class SpeedCurve:
         self.figure.scatter(
             "u", "mu", source=self._now, color=VERMILION, size=11, line_color="white"
         )
+        self.model.children = [self._sentence, self.figure]
         self._draw()
-        return self.figure
 
     def pause(self) -> None:
         """Stop solving, because the contact is being changed."""
@@ -69,7 +77,8 @@ class SpeedCurve:
         if contact != self._contact:
             self._case, self._contact, self.points = case, contact, []
             self._remaining = []
-            if conditions.sliding_speed and conditions.entrainment_speed:
+            self._slides = bool(conditions.sliding_speed and conditions.entrainment_speed)
+            if self._slides:
                 factors = np.geomspace(1.0 / SPEED_RANGE, SPEED_RANGE, POINTS)
                 ordered = sorted(factors, key=lambda factor: abs(np.log(factor)))
                 self._remaining = [float(f) * conditions.entrainment_speed for f in ordered]
@@ -115,13 +124,39 @@ class SpeedCurve:
                 name: to_display("friction_coefficient", values) for name, values in columns.items()
             },
         }
-        if self.figure is not None:
-            self.figure.title.text = self._title()
+        if self.figure is None:
+            return
+        speeds, values = self._extremes(low, high)
+        drawn = self._slides and bool(values)
+        if drawn:
+            _set_range(self.figure.x_range, min(speeds) / MARGIN, max(speeds) * MARGIN)
+            _set_range(self.figure.y_range, MARGIN * min(0.0, *values), MARGIN * max(*values, 1e-3))
+        self.figure.title.text = self._title()
+        self._sentence.text = sentences([self._title()], "soft")
+        self._sentence.visible, self.figure.visible = not drawn, drawn
+        self.model.min_height = TRIALS_HEIGHT if drawn else 0
+
+    def _extremes(self, low: list[float], high: list[float]) -> tuple[list[float], list[float]]:
+        """Return the speeds and the friction coefficients that the axes hold."""
+        speeds = [point.entrainment_speed_m_s for point in self.points]
+        return [*speeds, *self._remaining, *self._now.data["u"]], [
+            *low,
+            *high,
+            *self._now.data["mu"],
+        ]
 
     def _title(self) -> str:
-        if not self.points and not self._remaining:
-            return "No Stribeck curve: nothing slides"
+        if self._case is None:
+            return "The Stribeck curve follows when the contact is solved."
+        if not self._slides:
+            return "No Stribeck curve: nothing slides."
         if self._remaining:
             total = len(self.points) + len(self._remaining)
             return f"Stribeck curve, {len(self.points)} of {total} points"
+        if not self.points:
+            return "No Stribeck curve: no speed has a friction coefficient."
         return "Stribeck curve"
+
+
+def _set_range(axis: Range1d, start: float, end: float) -> None:
+    axis.update(start=start, end=end, reset_start=start, reset_end=end)

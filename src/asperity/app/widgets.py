@@ -51,6 +51,7 @@ Layout: TypeAlias = tuple[dict[str, object], list[PageSection]]
 LOOK = """
 :host { color: var(--ink); font: inherit; }
 .bk-clearfix { display: block; width: 100%; }
+.bk-clearfix:empty { display: none !important; }
 .bk-input { color: var(--ink); background: var(--paper); border: 1px solid var(--line);
   border-radius: 4px; }
 .bk-input, .bk-btn { font: inherit; }
@@ -83,6 +84,11 @@ img { display: block; width: 100%; height: auto; background: #fff; border-radius
 p { margin: 4px 0 0; font-size: .8rem; color: var(--soft); }
 """
 CHIP = ".bk-btn { border-radius: 99px; padding: 3px 12px; white-space: nowrap; font-size: .9rem; }"
+# on narrow screens: fades the right end of a row, as a hint that it scrolls
+FADE = """
+@media (max-width: 760px) { :host { padding-right: 36px;
+  mask-image: linear-gradient(90deg, #000 calc(100% - 48px), transparent); } }
+"""
 CHOSEN = ".bk-btn { border-color: var(--accent); box-shadow: inset 0 0 0 1px var(--accent); }"
 WRONG = ".bk-input { border-color: var(--alarm); border-width: 2px; }"
 SENTENCE = """
@@ -204,6 +210,7 @@ class InputWidget:
                 title=title,
                 value=case_input.text,
                 options=list(case_input.choices),
+                description=self._tooltip() if case_input.meaning else None,
                 **self._style(),
             )
             self.text.on_change("value", self._typed)
@@ -212,9 +219,7 @@ class InputWidget:
             self.text = TextInput(
                 title=title,
                 value=shown(case_input.text),
-                description=Tooltip(
-                    content=case_input.hint, position="bottom_center", stylesheets=[TOOLTIP]
-                ),
+                description=self._tooltip(),
                 **self._style(),
             )
             self.text.on_change("value", self._typed)
@@ -242,6 +247,11 @@ class InputWidget:
             margin=(0, 0, 4, 0),
             spacing=2,
             stylesheets=[INHERIT],
+        )
+
+    def _tooltip(self) -> Tooltip:
+        return Tooltip(
+            content=self.case_input.hint, position="bottom_center", stylesheets=[TOOLTIP]
         )
 
     @staticmethod

@@ -45,6 +45,8 @@ _FACTORS |= {
     "mPa s": 1e3,
 }
 _FACTORS |= {"mm³": 1e9, "°": 180.0 / math.pi, "h": 1.0 / 3600.0, "10⁶ turns": 1e-6}
+# units in headings of columns, as in print
+COLUMN_UNITS = {"um": "µm"} | {unit: unit for unit in ("h", "s", "min", "d", "mm", "nm", "m", "km")}
 _DISPLAYS = {  # display units of laws' parameters, where not the SI unit
     "Pa": "MPa",
     "1/Pa": "1/GPa",
@@ -256,6 +258,22 @@ def in_print(text: str) -> str:
         text,
     )
     return re.sub(r"(?<=\d) (?=[%±]|Hz|GPa|[µn]m\b)|(?<=±) ", "\N{NO-BREAK SPACE}", text)
+
+
+def column_label(name: str) -> str:
+    """Return the axis label of a column of a table from its heading with unit.
+
+    Examples
+    --------
+    >>> from asperity.core.quantities import column_label
+    >>> column_label("sq_um"), column_label("time_h")
+    ('Sq [µm]', 'time [h]')
+    """
+    stem, separator, unit = name.rpartition("_")
+    if separator and unit in COLUMN_UNITS:
+        symbol = "Sq" if stem == "sq" else stem.replace("_", " ")
+        return f"{symbol} [{COLUMN_UNITS[unit]}]"
+    return name
 
 
 @cache

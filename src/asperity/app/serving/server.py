@@ -149,6 +149,10 @@ class PageSite:
         }
         return {name: creators[name] for name, _ in self.links}
 
+    def _folder_name(self, kind: str) -> str:
+        """Return the folder that a page shows; empty for pages whose content visitors choose."""
+        return f", {self.opened.name}" if kind in ("study", "history") else ""
+
     def _visit_pool(self) -> VisitPool:
         """Return the worker pool of the current visit, which starts when its browser connects."""
         pool, document = VisitPool(self.worker_pool), _document()
@@ -191,7 +195,7 @@ class PageSite:
             "kind": kind,
             "headline": headline,
             "compiling": self.worker_pool.is_compiling,
-            "foot": f"asperity {version('asperity')}, {self.opened.name}",
+            "foot": f"asperity {version('asperity')}{self._folder_name(kind)}",
         }
         for name, value in variables.items():
             page.add_variable(name, value)

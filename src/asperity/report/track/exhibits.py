@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from asperity.core.arrays import Field
 from asperity.core.coverage import NORMAL_FACTOR
 from asperity.core.errors import BadInput
-from asperity.core.quantities import in_print, quantity
+from asperity.core.quantities import column_label, in_print, quantity
 from asperity.monitoring import BASELINE, Track, TrackedRecording
 from asperity.report.base import Exhibit
 from asperity.report.drawing import (
@@ -28,15 +28,11 @@ from asperity.trend import ALARM_FACTOR, ALERT_FACTOR, Stages
 MIN_CORRECTION = 1e-3  # of the CRF; smaller corrections for operating conditions are not drawn
 MARKERS = "osv^Dp*hXP<>"
 SEVERITY = LinearSegmentedColormap.from_list("severity", ["#0072b2", "#e69f00", "#d55e00"])
-UNITS = {"um": "µm"} | {unit: unit for unit in ("h", "s", "min", "d", "mm", "nm", "m", "km")}
 
 
 def x_label(track: Track) -> str:
     """Return the axis label of the series: sq_um as Sq [µm], time_h as time [h]."""
-    name, separator, unit = track.x_name.rpartition("_")
-    if separator and unit in UNITS:
-        return f"{'Sq' if name == 'sq' else name.replace('_', ' ')} [{UNITS[unit]}]"
-    return {"recording": "number"}.get(track.x_name, track.x_name)
+    return {"recording": "number"}.get(track.x_name, column_label(track.x_name))
 
 
 def crfa_label(track: Track) -> str:
