@@ -85,7 +85,7 @@ def test_the_report_opens_with_the_verdict(tmp_path):
     ):
         assert text_part in text
     assert len(re.findall(r'<tr class="worst">', text)) == 1
-    assert "8.0 <small>(5.0 to 13.0)</small>" in text
+    assert "8.0 <small>(5.0 to 13.0)</small>" in text.replace("\N{NO-BREAK SPACE}", " ")
 
 
 def test_contacts_in_pure_rolling_have_no_friction_and_equal_ones_are_listed_once(tmp_path):

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import pandas
 
-from asperity.core.quantities import in_print, quantity
+from asperity.core.quantities import in_print, mark_rolling, quantity
 from asperity.paper import is_papers_contact
 from asperity.report import animated_maps
 from asperity.report.base import Exhibit, Picture, heading, render, tile, write_exhibits, write_page
@@ -90,6 +90,8 @@ def render_wear_page(history: WearHistory) -> str:
     table = history.table
     model = history.contact.model
     last = table.iloc[-1]
+    rolling = history.case.conditions.sliding_speed == 0.0
+    printed = mark_rolling(history.printed_row(-1), rolling=rolling)
     tracks = exhibits.worn_tracks(history)
     scale = animated_maps.ranges(history.case, history.frames)
     captions = [_caption(history, frame) for frame in history.frames]
@@ -97,7 +99,7 @@ def render_wear_page(history: WearHistory) -> str:
         "wear/page.html.j2",
         title="Wear of a contact",
         history=history,
-        tiles=[tile(quantity(key), history.row_at(-1)) for key in TILES if last[key] == last[key]],
+        tiles=[tile(quantity(key), printed) for key in TILES if last[key] == last[key]],
         headline=exhibits.headline(history).picture(),
         resonance=_resonance(history),
         maps=animated_maps.animated_maps(history.case, scale),
