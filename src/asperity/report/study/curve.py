@@ -109,17 +109,14 @@ def resonance(study: StudyOverview, curve: WearCurve) -> Exhibit:
     anchors = study.anchors
 
     def draw(medium: Medium) -> Figure:
-        width = medium.double if len(presets) > 1 else medium.single
+        width = medium.width(len(presets) + 1)
         figure = Figure(figsize=(width, 0.62 * medium.double), layout="constrained")
         grid = figure.subplots(2, len(presets), sharex=True, sharey="row", squeeze=False)
         for preset, letters, (upper, lower) in zip(presets, ("ac", "bd"), grid.T, strict=False):
             _draw_preset(upper, lower, curve, anchors, preset)
             medium.title(upper, f"Vibration preset: {preset}", f"({letters[0]}) preset {preset}")
             medium.title(lower, "", f"({letters[1]}) preset {preset}")
-        grid[0, 0].set_ylabel(quantity("crf_hz").label)
-        grid[1, 0].set_ylabel(quantity("crfa").label)
         _limit_rows(grid[0, 0], grid[1, 0], curve, anchors)
-        grid[1, 0].set_ylim(bottom=0.0)
         legend_of_panels(figure, *grid.flat, columns=2 * len(presets))
         return figure
 
@@ -135,7 +132,9 @@ def resonance(study: StudyOverview, curve: WearCurve) -> Exhibit:
 
 
 def _limit_rows(upper: Axes, lower: Axes, curve: WearCurve, anchors: Sequence[Anchor]) -> None:
-    """Limit the axes of CRF and CRFA to their values with all presets, and to the anchors."""
+    """Label the axes of CRF and CRFA; limit them to their values and to the anchors."""
+    upper.set_ylabel(quantity("crf_hz").label)
+    lower.set_ylabel(quantity("crfa").label)
     anchor_values = [anchor.value for anchor in anchors if anchor.quantity in _CRF]
     crf, crfa = (
         [curve.by_case(key.format(preset))[1] for preset in curve.stages]
@@ -143,6 +142,7 @@ def _limit_rows(upper: Axes, lower: Axes, curve: WearCurve, anchors: Sequence[An
     )
     limit_to_data(upper, np.concatenate([anchor_values, *crf]))
     limit_to_data(lower, np.concatenate(crfa))
+    lower.set_ylim(bottom=0.0)
 
 
 _CRF = ("crf_sound_hz", "crf_paper_hz")
