@@ -131,6 +131,9 @@ def test_out_takes_the_result_and_no_other_option_does():
         (("new", "gears"), KINDS),
         (("solve", "case.toml", "--set", "load="), ("load=", "lacks a value", "contact.load=")),
         (("solve", "case.toml", "--set", "load=400 N"), ("did you mean contact.load?",)),
+        (("solve", "case.toml", "--report", "a.html"), ("asperity report RUN.nc",)),
+        (("machine", "case.toml", "--report", "a.html"), ("--out DIR writes",)),
+        (("demo", "--report", "a.html"), ("the page is always written",)),
     ],
 )
 def test_frequent_mistakes_are_answered_with_the_remedy(asp, tmp_path, arguments, parts):

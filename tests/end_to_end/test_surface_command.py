@@ -38,7 +38,7 @@ def test_surface_reports_its_processing_and_parameters(asp):
         "Sz",
         "Sdr",
         "quadratic form",
-        "longer than 200 um",
+        "longer than 200 µm",
     ):
         assert expected in out
     assert Path("map.png").read_bytes().startswith(b"\x89PNG")

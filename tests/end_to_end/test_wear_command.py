@@ -1,6 +1,7 @@
 """`asperity wear` from the command line."""
 
 import json
+import re
 from pathlib import Path
 
 import pandas
@@ -101,6 +102,11 @@ def test_the_verdict_comes_first_and_tables_follow(asp, worn_case):  # noqa: ARG
     first, *rest = out.splitlines()
     assert first.startswith("After 0.5 h the bodies have worn by ")
     assert any(line.split() == ["new", "after", "0.5", "h"] for line in rest)
+    assert "not determined" not in first
+    assert re.search(r"worn by [\d.]+ nm and [\d.]+ nm: Sq", first)
+    assert first.endswith("; 90 % intervals of the mean over positions.")
+    assert re.search(r"CLR [\d.]+ to [\d.]+ % \([\d.]+ to [\d.]+ %\)", first)
+    assert out.count("are not determined") == 1
     assert any(line.strip().startswith("wear volume") for line in rest)
     assert "  note: Only removal is modelled, no roughening." in rest
 

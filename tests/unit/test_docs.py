@@ -33,7 +33,6 @@ EXCEPTIONS = {  # valid spans of no known kind
     "is_...(head)": "a pattern for several functions",
     '["Rx", "Ry"]': "stands for two lengths",
     "linspace(0, fs/2, n/2)": "code of another program",
-    "NUMBA_CACHE_DIR": "an environment variable of numba",
     "milled_1.opd": "a file of the developers' data",
     "ground_lay.plu": "a file of the developers' data",
     "build/robustness.csv": "written by a benchmark",

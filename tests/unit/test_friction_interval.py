@@ -8,6 +8,7 @@ import pytest
 import scipy
 
 from asperity.case import load_case
+from asperity.cli.contact import short_table
 from asperity.core.quantities import quantity
 from asperity.lubricant import (
     Barus,
@@ -153,6 +154,11 @@ def test_pure_rolling_has_no_friction_and_no_interval():
     interval = run.friction_interval
     assert (interval.low, interval.value, interval.high) == (0.0, 0.0, 0.0)
     assert quantity("friction_coefficient").text_in(run.scalars()) == "0.0000"
+    printed = [line for line in short_table(run) if line.endswith("  none: pure rolling")]
+    assert [line.strip().partition(",")[0][:16] for line in printed] == [
+        "friction coeffic",
+        "maximum flash te",
+    ]
     assert not any(name.startswith("µ") for name, _ in uncertainty_rows(run.error, interval))
 
 

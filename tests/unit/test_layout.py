@@ -74,3 +74,8 @@ def test_every_line_of_a_result_fits(monkeypatch, capsys):
     table = output.columns(TITLES, ROWS, left=1)
     output.show("verdict " * 30, dict, rows, table, as_json=False, quiet=False)
     assert max(map(len, capsys.readouterr().out.splitlines())) <= 60
+
+
+def test_a_number_in_a_heading_stays_with_its_unit():
+    lines = list(layout(["mean film 90 %"], [["1"]], left=0, width=80))
+    assert [line.strip() for line in lines] == ["mean film", "90 %", "1"]

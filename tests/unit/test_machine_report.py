@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 from html import unescape
 from pathlib import Path
 
@@ -84,7 +85,23 @@ def test_the_report_opens_with_the_verdict(tmp_path):
     ):
         assert text_part in text
     assert len(re.findall(r'<tr class="worst">', text)) == 1
-    assert "8.0 (5.0 to 13.0)" in text
+    assert "8.0 <small>(5.0 to 13.0)</small>" in text.replace("\N{NO-BREAK SPACE}", " ")
+
+
+def test_contacts_in_pure_rolling_have_no_friction_and_equal_ones_are_listed_once(tmp_path):
+    result = solved(load_machine(EXAMPLES / "nu206.toml"))
+    rolling = {"friction_coefficient": 0.0, "friction_power_w": 0.0, "flash_temperature_max_k": 0.0}
+    result = replace(result, rows=tuple({**row, **rolling} for row in result.rows))
+    text = page(result, tmp_path)
+    tiles = text.split('class="tiles"')[1].split("</dl>")[0]
+    table = text.split('<table class="contacts"')[1].split("</table>")[0]
+    assert tiles.count("none: pure rolling") == 2
+    assert ("10 of 10 contacts roll without sliding" in text, "flash" in table) == (True, False)
+    names = re.findall(r'<th scope="row">(.*?)</th>', table)
+    assert names[2:4] == ["roller 1, 12, inner ring", "roller 1, 12, outer ring"]
+    assert len(names) == 6
+    result.rows[-1]["h_central_m"] = 3e-7  # roller 12, outer ring
+    assert len(re.findall('<th scope="row">r', page(result, tmp_path))) == 7
 
 
 def test_the_report_loads_no_resources_and_runs_no_scripts(tmp_path):

@@ -187,7 +187,10 @@ def test_a_missing_panel_names_the_extra():
         [sys.executable, "-c", without], capture_output=True, text=True, check=False
     )
     assert done.returncode == 2
-    assert done.stderr == "error: the live page needs Panel; pip install 'asperity[page]'\n"
+    assert done.stderr == (
+        "error: the live page needs Panel; pip install 'asperity[page]', in a clone pip install "
+        "'.[page]'\n"
+    )
 
 
 def test_results_of_jobs_reach_the_document_in_the_thread_of_the_server(monkeypatch):

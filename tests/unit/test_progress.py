@@ -13,13 +13,21 @@ from asperity.ehl import Iteration
 
 @pytest.mark.parametrize(("number", "announced"), [(0, True), (1, False)])
 def test_the_compilation_message_ends_with_the_first_iteration(
-    monkeypatch, capsys, number, announced
+    monkeypatch, capsys, tmp_path, number, announced
 ):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(output, "NOTICE_DELAY_S", 0.05)
     with output.solver_progress("case", quiet=False) as step:
         step(Iteration((8, 8), number, 1.0, 1.0, float("inf")))
         sleep(0.3)
     assert ("compiles the solver" in capsys.readouterr().err) is announced
+    (tmp_path / "kernel.nbi").touch()  # an earlier solve has compiled
+    assert output.compilation_text() == ""
+
+
+def test_units_are_printed_with_the_micro_sign(capsys):
+    output.print_line("60 us at 1.5 um; state sq = '2 um', 0.5um.nc")
+    assert capsys.readouterr().out == "60 µs at 1.5 µm; state sq = '2 um', 0.5um.nc\n"
 
 
 def test_progress_is_shown_on_the_terminal_while_output_is_redirected():

@@ -84,11 +84,11 @@ def test_a_stored_number_is_shown_in_its_display_unit():
 
 
 def test_intervals_stay_within_physical_bounds():
-    assert quantity("car").text_in({"car": 0.002, "car_error": 0.069}) == "0.2 (0.0 to 7.1) %"
-    assert quantity("car").text_in({"car": 0.97, "car_error": 0.05}) == "97.0 (92.0 to 100.0) %"
+    assert quantity("car").text_in({"car": 0.002, "car_error": 0.069}) == "0.2 % (0.0 to 7.1 %)"
+    assert quantity("car").text_in({"car": 0.97, "car_error": 0.05}) == "97.0 % (92.0 to 100.0 %)"
     assert quantity("car").text_in({"car": 0.2, "car_error": 0.069}) == "20.0 ± 6.9 %"
     film = quantity("h_central_m").text_in({"h_central_m": 1e-8, "h_central_error_m": 4e-8})
-    assert film == "0.010 (0.000 to 0.050) µm"
+    assert film == "0.010 µm (0.000 to 0.050 µm)"
     assert (
         quantity("car_domain").clipped_interval(1.2, 0.05) is None
     )  # relative to the Hertz area; real contact may extend beyond it

@@ -349,6 +349,18 @@ def test_levels_without_a_resonance_stay_on_the_axis():
     assert high > 4.0
 
 
+def test_a_preset_without_a_resonance_has_no_panel(wear):
+    table = wear.table.assign(crf_paper_hz=np.nan, crfa_paper=np.nan)
+    figure = figure_of(resonance, replace(wear, table=table), (), ON_PAGE)
+    titles = [axes.get_title(loc="left") for axes in figure.axes]
+    assert titles == ["Vibration preset: sound", ""]
+
+
+def test_too_few_levels_for_a_split_have_no_tile(wear):
+    assert "Split, preset" not in page_of(without_maps(wear)).text
+    assert "Split, preset" in page_of(without_maps(with_knee())).text
+
+
 def test_a_smooth_curve_has_no_stages(wear):
     figure = figure_of(resonance, wear, (), ON_PAGE)
     assert not [patch for axes in figure.axes for patch in axes.patches]

@@ -77,7 +77,8 @@ def test_two_measured_surfaces_keep_their_speeds(paper, tmp_path):
     assert (composite.first.sq, composite.second.sq) == pytest.approx((0.5e-6, 0.2e-6))
     np.testing.assert_array_equal(composite.surface.heights, case.surface().heights)
     assert any("face down" in note for note in case.surface_notes)
-    assert any(note.startswith("roller.x3p: turned by 90 degrees") for note in case.surface_notes)
+    turned = "roller.x3p: The preparation turned the map by 90 degrees"
+    assert any(note.startswith(turned) for note in case.surface_notes)
     assert paper.composite() is None
 
 

@@ -116,7 +116,7 @@ def test_a_quarter_turn_maps_x_to_y():
     restored = turned.turned().turned().turned()
     np.testing.assert_array_equal(restored.heights, z)
     assert (
-        "turned by 90 degrees"
+        "turned the map by 90 degrees"
         in condition_surface(measured(z), SurfaceConditioning(turn=True))[1][0]
     )
 

@@ -13,6 +13,7 @@ from asperity.surface import (
     gaussian_surface,
     level,
     prepare_surface,
+    step_sentence,
 )
 
 
@@ -142,6 +143,9 @@ def test_holes_are_filled_from_their_surroundings():
     )
     assert np.std(filled.surface.heights - complete.surface.heights) < 0.01 * complete.surface.sq
     assert any("missing cells" in step and "10 %" in step for step in filled.steps)
+    assert not any("missing cells" in step for step in complete.steps)
+    sentences = list(map(step_sentence, filled.steps))
+    assert all(text.startswith(("The preparation ", "The surface has ")) for text in sentences)
 
 
 def test_too_many_holes_are_refused():

@@ -41,6 +41,7 @@ from asperity.surface import (
     run_in_surface,
     sandblasted_surface,
     self_affine_surface,
+    step_sentence,
 )
 
 SAMPLE_DEVIATION = 0.05  # of a sample's correlation lengths, above which a note is given
@@ -290,7 +291,7 @@ class FileSection(SurfaceSection):
     def build(self, grid: Grid, folder: Path, *stream: int) -> tuple[Surface, tuple[str, ...]]:  # noqa: ARG002
         """Return the surface prepared for the grid, and its processing steps."""
         prepared = self.prepare(grid, folder)
-        return prepared.surface, prepared.steps
+        return prepared.surface, tuple(map(step_sentence, prepared.steps))
 
     @property
     def conditioning(self) -> SurfaceConditioning:
@@ -354,8 +355,9 @@ def composite_roughness(
     return combined, (
         *(f"{section.name}: {step}" for step in done),
         *(f"{section.second.name}: {step}" for step in done_to_second),
-        f"added {section.name} (moving at {speeds[0]:.4g} m/s) and {section.second.name} "
-        f"({speeds[1]:.4g} m/s), the second face down; composite Sq {length_text(combined.sq)}",
+        f"The composite roughness adds {section.name} (moving at {speeds[0]:.4g} m/s) and "
+        f"{section.second.name} ({speeds[1]:.4g} m/s), the second face down; its Sq is "
+        f"{length_text(combined.sq)}.",
     )
 
 

@@ -23,6 +23,11 @@ INTERRUPTED = 130  # typer's exit code for Ctrl-C
 MAX_ERROR = 480  # characters of an error message
 SUPERSCRIPTS = {chr(high): chr(low) for low, high in quantities.SUPERSCRIPTS.items()}
 PLAIN = {"µ": "u", "−": "-", "–": "-", "±": "+-", "×": "x", "Λ": "lambda", "′": "'", **SUPERSCRIPTS}
+PAGES = {  # how the page of a command without --report is written
+    "solve": "; save the run with --out RUN.nc, then asperity report RUN.nc writes a page",
+    "machine": "; --out DIR writes the result and its page",
+    "demo": "; the page is always written, to the folder of --out DIR",
+}
 
 app = typer.Typer(
     cls=GroupedCommands,
@@ -87,6 +92,8 @@ def _outcome(arguments: list[str]) -> tuple[int, str | None]:
         context = getattr(error, "ctx", None)
         command = "asperity" if context is None else context.command_path
         sentence = error.format_message().rstrip(".")
+        if getattr(error, "option_name", None) == "--report":
+            sentence += PAGES.get(command.rpartition(" ")[2], "")
         see = " See" if sentence.endswith("?") else "; see"
         return error.exit_code, f"{sentence}{see} {command} --help"
     if code == INTERRUPTED:

@@ -23,8 +23,9 @@ from asperity.cli.options import (
 from asperity.cli.output import Block, Row, SolverSteps, known_rows, progress, show, table, text
 from asperity.cli.terminal.browser import open_page
 from asperity.core import files, processes
+from asperity.core.documents import Table
 from asperity.core.errors import AsperityError
-from asperity.core.quantities import quantity
+from asperity.core.quantities import mark_rolling, quantity
 
 if TYPE_CHECKING:
     from asperity.case import Case
@@ -159,12 +160,18 @@ def _solve(
 
 def short_table(run: "Run") -> Block:
     """Return the main numbers of a run, and the first sentence of each note."""
-    values = run.scalars()
+    values = _printed(run)
     main = [quantity(key) for key in MAIN if values.get(key) is not None]
     rows = [(entry.title, entry.text_in(values)) for entry in main]
     notes = [f"{note.partition('. ')[0].rstrip('.')}." for note in _notes(run)]
     yield from table(rows, notes)
     yield "  --all prints all quantities, the parts of the intervals and the notes in full."
+
+
+def _printed(run: "Run") -> Table:
+    """Return the numbers of a run; of pure rolling, a text in place of friction and heat."""
+    rolling = run.solution.conditions.sliding_speed == 0.0
+    return mark_rolling(run.scalars(), rolling=rolling)
 
 
 def _notes(run: "Run") -> list[str]:
@@ -179,7 +186,7 @@ def _numbers(run: "Run") -> Iterator[Row]:
     """
     central = quantity("h_central_m").title
     spot = run.running is None and run.state.sq > 0.0 and run.solution.lubricant is not None
-    values = {key: value for key, value in run.scalars().items() if key not in CONVERGENCE}
+    values = {key: value for key, value in _printed(run).items() if key not in CONVERGENCE}
     for title, value in known_rows(values):
         yield (
             title,

@@ -39,7 +39,7 @@ from asperity.cli.output import Block, columns, named_path, progress, show, tabl
 from asperity.cli.terminal.browser import open_page, require_page
 from asperity.core import processes
 from asperity.core.errors import BadInput, require_choice
-from asperity.core.quantities import quantity
+from asperity.core.quantities import NO_VALUE, quantity
 
 if TYPE_CHECKING:
     from asperity.inference import (
@@ -317,6 +317,7 @@ def _show(
 def _posterior(result: "Inference") -> Block:
     """Return a row per quantity: median, interval with and without the law's error, information."""
     exact = result.posterior(discrepancy=False)
+    bits = quantity("information_bits")
     rows = []
     for key, estimate in result.posterior().items():
         entry = quantity(key)
@@ -326,8 +327,7 @@ def _posterior(result: "Inference") -> Block:
                 entry.number(estimate.median),
                 entry.interval(estimate.low, estimate.high),
                 entry.interval(exact[key].low, exact[key].high),
-                quantity("information_bits").number(estimate.information_bits),
-                "" if estimate.learnt else "as assumed",
+                bits.number(estimate.information_bits) if estimate.learnt else NO_VALUE,
             ]
         )
     point = result.forward.points[0]
@@ -339,11 +339,12 @@ def _posterior(result: "Inference") -> Block:
             "90 %",
             "90 %, laws exact",
             "bits",
-            "",
         ],
         rows,
         left=1,
     )
+    if any(row[-1] == NO_VALUE for row in rows):
+        yield f"  {NO_VALUE}: as assumed; the recordings give less than half a bit"
 
 
 def _points(result: "Inference") -> Block:

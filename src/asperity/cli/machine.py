@@ -26,7 +26,7 @@ from asperity.cli.terminal.browser import open_page, require_opened
 from asperity.core import files
 from asperity.core.documents import Table
 from asperity.core.errors import AsperityError
-from asperity.core.quantities import quantity
+from asperity.core.quantities import NO_VALUE, UNKNOWN, mark_rolling, quantity
 
 if TYPE_CHECKING:
     from asperity.core.quantities import Quantity
@@ -42,6 +42,7 @@ CONDITIONS = (  # key of a row, and of the quantity that formats it
     ("slide_to_roll", "slide_to_roll"),
     ("p_hertz_pa", "hertz_pressure_pa"),
 )
+UNSOLVED_ONLY = ("line_load_n_m", "entrainment_m_s")  # conditions printed without a solution
 STIFFNESSES = (
     ("radial", ("N/µm", 1e-6)),
     ("axial", ("N/µm", 1e-6)),
@@ -51,9 +52,6 @@ SOLVED = (
     "h_central_m",
     "lambda_ratio",
     "clr",
-    "car",
-    "p_max_pa",
-    "von_mises_core_pa",
     "friction_coefficient",
     "flash_temperature_max_k",
     "crf_hz",
@@ -136,12 +134,13 @@ def _written(page: Path | None, out: Path | None, figures: Path | None) -> Block
 
 def _ratings(result: "MachineResult") -> Iterator[Row]:
     """Return the ratings of the machine; ranges for those along the path of contact."""
+    missing: dict[str, list[str]] = {}  # names by reason
     for rating in result.ratings:
         entry = quantity(rating.key)
         values = [value for value in rating.values.values() if value is not None]
         outside = f"; outside its range: {rating.beyond}" if rating.beyond else ""
         if rating.reason:
-            yield entry.title, f"not rated: {rating.reason}"
+            missing.setdefault(rating.reason, []).append(entry.short)
         elif rating.machine_value is not None:
             yield entry.title, f"{entry.text(rating.machine_value)}  ({rating.standard}{outside})"
         else:
@@ -150,24 +149,45 @@ def _ratings(result: "MachineResult") -> Iterator[Row]:
                 f"{entry.number(min(values))} to {entry.text(max(values))}  "
                 f"({rating.standard}{outside})",
             )
+    for reason, names in missing.items():
+        yield "not rated", f"{', '.join(names)}: {reason}"
 
 
 def _contacts(result: "MachineResult") -> Block:
-    """Return a row per contact, including both sides of a load zone."""
+    """Return a row per contact, one for both sides of a load zone; all numbers are in JSON."""
     heads = [(key, quantity(name)) for key, name in CONDITIONS]
     if result.solved:
-        solved_keys = [key for key in SOLVED if any(row[key] is not None for row in result.rows)]
-        heads += [(key, quantity(key)) for key in solved_keys]
-    return columns(
+        heads = [head for head in heads if head[0] not in UNSOLVED_ONLY]
+        heads += [(key, quantity(key)) for key in SOLVED]
+    heads = [head for head in heads if result.has_values(head[0])]
+    marked = [
+        mark_rolling(row, rolling=row["slide_to_roll"] == 0.0, mark=NO_VALUE) for row in result.rows
+    ]
+    rows = [(str(row["name"]), [_number(row, *head) for head in heads]) for row in marked]
+    yield from columns(
         ["contact", *(entry.label for _, entry in heads)],
-        ([row["name"], *(_number(row, key, entry) for key, entry in heads)] for row in result.rows),
+        ([name, *rows[equal[0]][1]] for name, equal in machines.merge_symmetric(rows)),
         left=1,
     )
+    yield from table([], _contact_notes(result))
+
+
+def _contact_notes(result: "MachineResult") -> Iterator[str]:
+    """Yield what the table of contacts leaves out, and why."""
+    rolling = [row for row in result.rows if row["slide_to_roll"] == 0.0]
+    if rolling:
+        count = f"{len(rolling)} of {len(result.rows)}"
+        yield f"{count} contacts roll without sliding: no sliding friction, no flash temperature."
+    if any(row.get("clr") is not None and row.get("clr_low") is None for row in result.rows):
+        yield "The 90 % intervals of CLR that are missing in the table are not determined."
+    if result.solved:
+        yield "--json and the page of --out DIR have all quantities and intervals."
 
 
 def _number(row: Table, key: str, entry: "Quantity") -> str:
-    """Return the number, with its interval if the row has one."""
-    return entry.number_in(row) if key == entry.key else entry.number(row[key])
+    """Return the number; that of CLR with its interval, if it is determined."""
+    number = entry.number_in(row) if key == "clr" else entry.number(row[key])
+    return number.removesuffix(f" ({UNKNOWN})")
 
 
 def _stiffness(result: "MachineResult") -> Iterator[Row]:

@@ -20,15 +20,13 @@ from asperity.cli.options import (
     SurfaceFile,
     chosen_case,
 )
-from asperity.cli.output import Block, Row, progress, show, table, text, written
+from asperity.cli.output import Block, Row, compilation_text, progress, show, table, text, written
 from asperity.cli.terminal.browser import open_page, require_page
 from asperity.core.errors import AsperityError, BadInput, NotConverged
 from asperity.core.quantities import catalogue, quantity
 
 if TYPE_CHECKING:
     from asperity.simulation import History, HistoryProgress
-
-COMPILES = "the start; after installation the first solve compiles the solver, up to a minute ..."
 
 
 PathArgument = Annotated[
@@ -118,7 +116,7 @@ def run(
 def _steps_shown(label: str, *, quiet: bool) -> "Iterator[Callable[[HistoryProgress], None]]":
     """Show completed steps and the load share on a terminal."""
     clr = quantity("clr")
-    with progress(label, COMPILES, quiet=quiet) as display:
+    with progress(label, f"the start{compilation_text()} ...", quiet=quiet) as display:
 
         def step(state: "HistoryProgress") -> None:
             share = f"{clr.short} {clr.text(state.row['clr'])}"
@@ -150,19 +148,17 @@ def _history_table(moved: "History") -> Block:
     """Return means over the settled steps with their deviations, and initial values."""
     values = moved.scalars()
     motion = moved.case.motion
-    rows: list[Row] = [
-        (
-            "steps, computed now",
-            f"{moved.steps}, {moved.computed} in {text('seconds', moved.seconds)}",
-        ),
-        (
-            quantity("step_s").title,
-            f"{text('step_s', values['step_s'])}, {motion.time_step:g} of the oil's travel time "
-            f"per cell; start {motion.start}",
-        ),
-        (f"means and deviations, from step {values['settled_from_step']}", ""),
-    ]
-    rows += _means(values)
+    yield from table(
+        [
+            ("steps", f"{moved.steps}, start {motion.start}"),
+            ("computed by this call", f"{moved.computed} in {text('seconds', moved.seconds)}"),
+            (quantity("step_s").title, text("step_s", values["step_s"])),
+            ("time step over the oil's time per cell", f"{motion.time_step:g}"),
+        ]
+    )
+    yield ""
+    yield f"  Means and standard deviations from step {values['settled_from_step']} on:"
+    rows = list(_means(values))
     passes = values.get("passes", [])
     for lap in passes[:: max(1, len(passes) - 1)]:
         selected = [quantity(key) for key in ("clr", "car", "track_sq_m")]
@@ -174,6 +170,6 @@ def _history_table(moved: "History") -> Block:
         )
     if values["crf_hz"] is not None:
         rows.append(
-            (f"{quantity('crf_hz').title}, of the mean contact", text("crf_hz", values["crf_hz"]))
+            (f"{quantity('crf_hz').short} of the mean contact", text("crf_hz", values["crf_hz"]))
         )
     yield from table(rows, moved.notes)

@@ -1,6 +1,8 @@
 """Output of commands: a verdict with tables and notes, or one JSON object; and progress."""
 
 import json
+import os
+import re
 import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
 
 FIRST_LINE_S, MAX_LINE_DELAY_S = 5.0, 600.0  # between lines of progress without a terminal
 NOTICE_DELAY_S = 2.0  # without a solver step, after which compilation is announced
+
+MICRO = re.compile(r"(?<=\d )u(?=[ms]\b(?![\"']))")  # of a unit, except in a quoted value
 
 Block = Iterable[str]  # lines, evaluated only when printed
 Row = tuple[str, str]
@@ -62,7 +66,7 @@ def show(
 
 def print_line(line: str, *, flush: bool = False) -> None:
     """Print a line, continued on further lines where it is wider than the terminal."""
-    for part in fitted(printable(with_options(line)), terminal_width()):
+    for part in fitted(MICRO.sub("µ", printable(with_options(line))), terminal_width()):
         print(part, flush=flush)
 
 
@@ -132,6 +136,14 @@ class Display(Protocol):
         """Update the display."""
 
 
+def compilation_text() -> str:
+    """Return a clause on the compilation at the first solve; empty where its result is stored."""
+    folder = Path(os.environ.get("NUMBA_CACHE_DIR") or Path(__file__).parents[1] / "kernels")
+    if next(folder.rglob("*.nbi"), None) is not None:  # index of a compiled kernel
+        return ""
+    return "; the first solve after installation compiles the solver, up to a minute"
+
+
 @contextmanager
 def _log(label: str, doing: str, notice: str | None) -> Iterator[Display]:
     """Show progress as lines of a log, with a notice unless an iteration is completed soon."""
@@ -168,18 +180,15 @@ def progress(
 ) -> Iterator[Display]:
     """Show progress on a terminal, otherwise (with `log`) as lines at growing intervals.
 
-    With `compiles`, the compilation at the first solve after installation is announced after a
-    delay.
+    With `compiles`, a notice after a delay states that no iteration is completed yet; it names the
+    compilation at the first solve after installation.
     """
     terminal = sys.stderr.isatty()
     if quiet or not (terminal or log):
         yield _unseen
         return
     label = printable(label)
-    notice = (
-        f"{label}: no iteration yet; the first solve after installation compiles the solver, "
-        "up to a minute ..."
-    )
+    notice = f"{label}: no iteration yet{compilation_text()} ..."
     if not terminal:
         with _log(label, doing, notice if compiles else None) as display:
             yield display

@@ -8,7 +8,7 @@ import typer
 
 from asperity import report
 from asperity.cli.app import app
-from asperity.core.errors import BadInput
+from asperity.core.errors import BadInput, install_text
 
 PageSource = Annotated[
     Path | None,
@@ -51,7 +51,7 @@ def page_command(
             "markupsafe",
         ):
             raise
-        raise BadInput("the live page needs Panel; pip install 'asperity[page]'") from None
+        raise BadInput(f"the live page needs Panel; {install_text('page')}") from None
 
 
 def _print_address(listen: str, address: str) -> None:

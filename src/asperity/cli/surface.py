@@ -154,4 +154,5 @@ def _parameters(description: "SurfaceDescription", *, named: bool) -> Block:
     )
     bound = "Str is an upper bound: the lay extends over half the map"
     bounded = [bound] if of_map and description.parameters.str_bounded else []
-    yield from table(rows, (*bounded, *description.steps, *measured.notes))
+    steps = map(surface.step_sentence, (*bounded, *description.steps, *measured.notes))
+    yield from table(rows, steps)

@@ -23,11 +23,20 @@ from asperity.cli.options import (
     Workers,
     chosen_case,
 )
-from asperity.cli.output import Block, columns, progress, show, span, table, written
+from asperity.cli.output import (
+    Block,
+    columns,
+    compilation_text,
+    progress,
+    show,
+    span,
+    table,
+    written,
+)
 from asperity.cli.terminal.browser import open_page, require_page
 from asperity.core.errors import BadInput
 from asperity.core.processes import cores
-from asperity.core.quantities import quantity
+from asperity.core.quantities import mark_rolling, quantity
 
 if TYPE_CHECKING:
     from asperity.case import Case
@@ -35,7 +44,6 @@ if TYPE_CHECKING:
     from asperity.surface import MeasuredSurface
     from asperity.wear import WearFit
 
-STARTS = "the start; after installation the first solve compiles the solver, up to a minute ..."
 CONTACT = (
     "sq_m",
     "ssk",
@@ -151,7 +159,9 @@ def _show(history: "WearHistory", page: Path | None, *, as_json: bool, quiet: bo
         _contact(history),
         _bodies(history),
         table([], history.notes),
-        written("Saved in", history.folder),
+        []
+        if history.folder is None
+        else [f"Saved in {history.folder}; the same command resumes it"],
         written("Report", page),
         as_json=as_json,
         quiet=quiet,
@@ -161,7 +171,7 @@ def _show(history: "WearHistory", page: Path | None, *, as_json: bool, quiet: bo
 def _simulate(
     chosen: "Case", label: str, hours: float, out: Path | None, workers: int, *, quiet: bool
 ) -> "WearHistory":
-    with progress(label, STARTS, quiet=quiet) as display:
+    with progress(label, f"the start{compilation_text()} ...", quiet=quiet) as display:
 
         def jump(state: "WearProgress") -> None:
             row = state.row
@@ -234,17 +244,13 @@ def _fitted(fitted: "WearFit") -> Block:
 
 def _contact(history: "WearHistory") -> Block:
     """Return the initial and final values of the composite surface and the contact."""
-    first, last = history.row_at(0), history.row_at(-1)
+    rolling = history.case.conditions.sliding_speed == 0.0
+    first, last = (mark_rolling(history.printed_row(row), rolling=rolling) for row in (0, -1))
     rows = [
-        (
-            quantity(key).title,
-            quantity(key).number_in(first),
-            quantity(key).number_in(last),
-            quantity(key).display,
-        )
-        for key in CONTACT
+        (entry.title, entry.number(first[entry.key]), entry.text_in(last))
+        for entry in map(quantity, CONTACT)
     ]
-    return columns(["", "new", f"after {history.hours:.4g} h", ""], rows, left=1)
+    return columns(["", "new", f"after {history.hours:.4g} h"], rows, left=1)
 
 
 def _bodies(history: "WearHistory") -> Block:

@@ -29,6 +29,18 @@ class NotConverged(AsperityError):
         self.solution = solution
 
 
+def install_text(extra: str) -> str:
+    """Return how an extra is installed.
+
+    Examples
+    --------
+    >>> from asperity.core.errors import install_text
+    >>> install_text("page")
+    "pip install 'asperity[page]', in a clone pip install '.[page]'"
+    """
+    return f"pip install 'asperity[{extra}]', in a clone pip install '.[{extra}]'"
+
+
 def with_article(noun: str) -> str:
     """Return the noun with its indefinite article.
 

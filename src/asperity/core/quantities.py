@@ -18,8 +18,13 @@ from asperity.core.errors import require_positive
 
 NO_VALUE = "–"
 UNKNOWN = "± not determined"  # interval of a number
+ROLLING = "none: pure rolling"  # friction and heat where nothing slides
 # groups of non-negative quantities: shares, film thicknesses, friction
 BOUNDED = ("load", "sharing", "film", "friction")
+SLIDING = (  # quantities that sliding causes
+    *("friction_coefficient", "friction_asperity_part", "friction_oil_part"),
+    *("friction_power_w", "flash_temperature_max_k"),
+)
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 # display units per SI unit; any other display unit is the SI unit itself
 _FACTORS = {
@@ -162,9 +167,11 @@ class Quantity:
         A quantity with keys for an interval shows no deviation, which is only a part of the
         uncertainty; without values for them the interval is "± not determined". A share or film
         thickness whose deviation exceeds the physical range shows the clipped interval: "0.2 (0.0
-        to 7.1)".
+        to 7.1)". A text in place of the number is returned unchanged.
         """
         value = values.get(self.key)
+        if isinstance(value, str):
+            return value
         (low, high) = (_as_float(values.get(end)) for end in self.ends)
         if self.ends[0] not in values:
             deviation = _as_float(values.get(self.deviation))
@@ -201,13 +208,20 @@ class Quantity:
         return max(0.0, low), min(most, high)
 
     def text_in(self, values: Table) -> str:
-        """Format its number in a row with its unit: "61.3 (44 to 78) %"."""
-        number, unknown = self.number_in(values), f" ({UNKNOWN})"
-        if number == NO_VALUE or not self.display:
+        """Format its number in a row with its unit: "61.3 % (44 to 78 %)" or "61.3 ± 2.4 %"."""
+        number = self.number_in(values)
+        if number == NO_VALUE or not self.display or isinstance(values.get(self.key), str):
             return number
-        if number.endswith(unknown):
-            return f"{number.removesuffix(unknown)} {self.display}{unknown}"
-        return f"{number} {self.display}"
+        value, bracket, interval = number.partition(" (")
+        if not bracket:
+            return f"{number} {self.display}"
+        end = "" if interval.startswith(UNKNOWN) else f" {self.display}"
+        return f"{value} {self.display} ({interval.removesuffix(')')}{end})"
+
+
+def mark_rolling(values: Table, *, rolling: bool, mark: str = ROLLING) -> Table:
+    """Replace the numbers that sliding causes by a text, if the contact is in pure rolling."""
+    return {**values, **{key: mark for key in SLIDING if rolling and key in values}}
 
 
 def _as_float(value: object) -> float | None:

@@ -13,7 +13,7 @@ import scipy
 
 from asperity.core.arrays import Field
 from asperity.core.documents import JsonObject
-from asperity.core.errors import BadInput
+from asperity.core.errors import BadInput, install_text
 
 LENGTHS = (0.1, 30.0)  # bounds of the kernel's lengths, in widths of the cube
 LEVELS = (1e-2, 1e2)  # bounds of the variance of the process over that of the data
@@ -142,7 +142,7 @@ def require_learning() -> None:
         import sklearn.gaussian_process  # noqa: F401 - an extra, and slow to load
     except ModuleNotFoundError:
         raise BadInput(
-            "the emulator needs scikit-learn, which is not installed; pip install 'asperity[infer]'"
+            f"the emulator needs scikit-learn, which is not installed; {install_text('infer')}"
         ) from None
 
 

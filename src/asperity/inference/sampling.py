@@ -14,7 +14,7 @@ from scipy.special import logsumexp, ndtri
 from threadpoolctl import threadpool_limits
 
 from asperity.core.arrays import Field, Mask
-from asperity.core.errors import BadInput
+from asperity.core.errors import BadInput, install_text
 
 FIRST, BATCH, ROUNDS = 4096, 2048, 30  # draws from the prior, draws per round, rounds
 ENOUGH = 1000.0  # effective sample size: the error of a quantile is 1/20 of the width
@@ -198,7 +198,7 @@ def nested(
         import dynesty
     except ModuleNotFoundError:
         raise BadInput(
-            "nested sampling needs dynesty, which is not installed; pip install 'asperity[infer]'"
+            f"nested sampling needs dynesty, which is not installed; {install_text('infer')}"
         ) from None
     sampler = dynesty.NestedSampler(
         lambda z: float(log_target(evaluate(z[None]))[0]),

@@ -1,6 +1,7 @@
 from .fatigue_ratings import DangVan as DangVan
 from .rating_facts import Rating as Rating
 from .result import MachineResult as MachineResult
+from .result import merge_symmetric as merge_symmetric
 from .solve import machine_conditions as machine_conditions
 from .solve import solve_machine as solve_machine
 from .sweep import MachineSweep as MachineSweep

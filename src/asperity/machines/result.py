@@ -1,6 +1,7 @@
 """Result of a machine: one row per contact, the worst contact, verdict, notes and ratings."""
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Any, TypeAlias
 from asperity.case import MachineCase
 from asperity.contact.materials import material
 from asperity.core.displayed import Displayed
-from asperity.core.quantities import quantity
+from asperity.core.quantities import SLIDING, quantity
 from asperity.machine import BallBearing, CylindricalRollerBearing, MachineContact
 from asperity.machines.fatigue_ratings import DangVan, dang_van_below
 from asperity.machines.gear_ratings import warmer_teeth
@@ -42,6 +43,12 @@ class MachineResult(Displayed):
     def failures(self) -> list[Row]:
         """Rows of the contacts that were not solved, each with its `reason`."""
         return [row for row in self.rows if row.get("reason")]
+
+    def has_values(self, key: str) -> bool:
+        """Return whether a contact has a value; zero counts unless sliding causes the quantity."""
+        if key in (*SLIDING, "slide_to_roll"):
+            return any(row.get(key) for row in self.rows)
+        return any(row.get(key) is not None for row in self.rows)
 
     @property
     def worst(self) -> Row:
@@ -231,6 +238,30 @@ def condition_row(contact: MachineContact, case: MachineCase) -> Row:
         "p_hertz_pa": contact.hertz(case.pair).p_max,
         "overrolling_hz": list(contact.overrolling_hz),
     }
+
+
+def merge_symmetric(table: Sequence[tuple[str, Sequence[str]]]) -> list[tuple[str, list[int]]]:
+    """Return the names of contacts with their rows, rolling elements with equal cells once.
+
+    Examples
+    --------
+    >>> from asperity.machines import merge_symmetric
+    >>> merge_symmetric([("ball 1, inner ring", ["7"]), ("ball 8, inner ring", ["7"])])
+    [('ball 1, 8, inner ring', [0, 1])]
+    """
+    merged: dict[tuple[str, ...], list[int]] = {}
+    parts = [re.fullmatch(r"(\w+ )(\d+)(, .+)", name) for name, _ in table]
+    for row, ((name, cells), part) in enumerate(zip(table, parts, strict=True)):
+        key = (name,) if part is None else (part[1], part[3], *cells)
+        merged.setdefault(key, []).append(row)
+
+    def common_name(rows: list[int]) -> str:
+        part = parts[rows[0]]
+        if part is None:
+            return table[rows[0]][0]
+        return f"{part[1]}{', '.join(found[2] for row in rows if (found := parts[row]))}{part[3]}"
+
+    return [(common_name(rows), rows) for rows in merged.values()]
 
 
 def _regime(row: Row) -> str:

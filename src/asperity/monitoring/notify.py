@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 from urllib.parse import SplitResult, unquote, urlsplit
 
 from asperity.core.documents import JsonObject
-from asperity.core.errors import BadInput
+from asperity.core.errors import BadInput, install_text
 from asperity.core.third_party import first_line
 from asperity.monitoring.settings import Notifier
 from asperity.monitoring.store.sensors import Sensors
@@ -265,7 +265,7 @@ def notifiers(
         try:
             import paho.mqtt.client  # noqa: F401
         except ImportError:
-            raise BadInput("MQTT needs paho-mqtt; pip install 'asperity[monitor]'") from None
+            raise BadInput(f"MQTT needs paho-mqtt; {install_text('monitor')}") from None
         if "+" in urlsplit(mqtt).path or "#" in mqtt:
             raise BadInput(
                 "a topic to publish to has neither + nor #, "

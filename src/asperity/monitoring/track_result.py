@@ -14,7 +14,7 @@ import numpy as np
 from asperity.core.arrays import finite_or_none
 from asperity.core.displayed import Displayed
 from asperity.core.documents import JsonObject
-from asperity.core.errors import BadInput
+from asperity.core.errors import BadInput, install_text
 from asperity.core.files import atomic_write, write_csv
 from asperity.core.quantities import quantity
 from asperity.core.storage import netcdf_bytes
@@ -341,7 +341,7 @@ class Track(Displayed):
                 try:
                     self.table.to_parquet(part, index=False)
                 except ImportError:
-                    remedy = "pip install 'asperity[recordings]', or write a .csv"
+                    remedy = f"{install_text('recordings')}, or write a .csv"
                     raise BadInput(f"{path.name} needs pyarrow; {remedy}") from None
             else:
                 packed = {"zlib": True, "complevel": 1, "shuffle": True}

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile, ZipFile
 
-from asperity.core.errors import BadInput, UnreadableFile, require_positive
+from asperity.core.errors import BadInput, UnreadableFile, install_text, require_positive
 from asperity.core.files import require_file
 from asperity.core.limits import require_plausible_size
 from asperity.core.third_party import first_line, suppress_output
@@ -158,7 +158,7 @@ def read_contents(path: Path) -> Contents:
         raise
     except ImportError:
         raise UnreadableFile(
-            f"{path.name} needs {chosen.package} to be read; pip install 'asperity[recordings]'"
+            f"{path.name} needs {chosen.package} to be read; {install_text('recordings')}"
         ) from None
     except MemoryError:
         raise UnreadableFile(

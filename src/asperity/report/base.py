@@ -137,14 +137,13 @@ class Tile(NamedTuple):
 def tile(quantity: Quantity, row: Numbers) -> Tile:
     """Return the tile of a quantity of a row, with its uncertainty and unit."""
     low, high = (row.get(end) for end in quantity.ends)
-    if low is not None and high is not None:
-        return Tile(
-            heading(quantity),
-            quantity.number(row[quantity.key]),
-            f"({quantity.interval(low, high)})",
-        )
-    if quantity.ends[0] in row and row[quantity.key] is not None:
-        return Tile(heading(quantity), quantity.number(row[quantity.key]), UNKNOWN)
+    number = row.get(quantity.key)
+    if isinstance(number, str):
+        return Tile(heading(quantity), number, "")
+    if number is not None and quantity.ends[0] in row:
+        interval = UNKNOWN if low is None or high is None else quantity.interval(low, high)
+        detail = f"{quantity.display} ({interval})".lstrip()
+        return Tile(heading(quantity), quantity.number(number), detail)
     value, _, deviation = quantity.number_in(row).partition(" ± ")
     if value.startswith("("):  # the power of ten of both
         deviation, _, power = deviation.partition(")")

@@ -5,7 +5,7 @@ from concurrent.futures import Executor
 from contextlib import contextmanager
 from typing import Any
 
-from asperity.core.errors import BadInput
+from asperity.core.errors import BadInput, install_text
 
 DASK_WAIT_S = 10.0
 
@@ -22,9 +22,7 @@ def dask_executor(address: str) -> Iterator[Executor]:
     try:
         from distributed import Client
     except ModuleNotFoundError:
-        raise BadInput(
-            "a dask executor needs dask.distributed; pip install 'asperity[study]'"
-        ) from None
+        raise BadInput(f"a dask executor needs dask.distributed; {install_text('study')}") from None
     try:
         client: Any = Client(address, timeout=DASK_WAIT_S)  # type: ignore[no-untyped-call]
     except (OSError, ValueError, TypeError) as error:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from asperity.core.arrays import Field
-from asperity.core.errors import AsperityError, BadInput, UnreadableFile
+from asperity.core.errors import AsperityError, BadInput, UnreadableFile, install_text
 from asperity.core.limits import require_plausible_size
 from asperity.core.sandbox import read_in_subprocess
 from asperity.core.storage import digest
@@ -27,7 +27,7 @@ def require_zarr() -> Any:
     try:
         import zarr
     except ModuleNotFoundError:
-        raise BadInput("storing fields needs zarr; pip install 'asperity[study]'") from None
+        raise BadInput(f"storing fields needs zarr; {install_text('study')}") from None
     return zarr
 
 

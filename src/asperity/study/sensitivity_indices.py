@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from asperity.core.arrays import Field
-from asperity.core.errors import AsperityError, BadInput
+from asperity.core.errors import AsperityError, BadInput, install_text
 
 SensitivityMethod = Literal["morris", "sobol"]
 # default number of trajectories and of base samples (a power of two)
@@ -40,7 +40,7 @@ def sample_design(
     try:
         import SALib  # noqa: F401
     except ModuleNotFoundError:
-        raise BadInput("sensitivity needs SALib; pip install 'asperity[study]'") from None
+        raise BadInput(f"sensitivity needs SALib; {install_text('study')}") from None
     if size < 2:
         counted = "trajectories" if method == "morris" else "samples"
         raise BadInput(f"{counted} must be 2 or more, got {size}; {SIZES[method]} is the default")

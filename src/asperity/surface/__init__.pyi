@@ -31,6 +31,7 @@ from .prepare import FitMode as FitMode
 from .prepare import PreparedSurface as PreparedSurface
 from .prepare import count_places as count_places
 from .prepare import prepare_surface as prepare_surface
+from .prepare import step_sentence as step_sentence
 from .profile import ProfileParameters as ProfileParameters
 from .profile import profile_parameters as profile_parameters
 from .read import read_surface as read_surface

@@ -80,7 +80,7 @@ def condition_surface(
     steps = []
     if settings.turn:
         measured = measured.turned()
-        steps.append("turned by 90 degrees: x of the file runs along y")
+        steps.append("turned the map by 90 degrees: x of the file runs along y")
     outlying = find_outliers(measured)
     count = int(np.count_nonzero(outlying))
     criterion = f"more than {_OUTLIER_THRESHOLD:g} robust deviations from their neighbours"

@@ -36,6 +36,8 @@ _OVERLAP = 1.0 / 8.0  # share of a periodic side over which its ends are blended
 # Windowed sinc: with these settings aliases are below 1e-3, waves longer than 2.3 cells unchanged
 _LOBES = 16  # to either side
 _KAISER = 6.0  # parameter of the Kaiser window
+# first words of the steps of a preparation
+_VERBS = ("turned", "removed", "kept", "cut", "repeated", "filled", "resampled", "blended")
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +120,7 @@ def prepare_surface(
     heights, positions = _cut(levelled, grid, overlap, centre)
     heights, filling = _fill(heights, levelled, max_missing)
     heights, resampling = _resample(heights, positions, levelled.grid, grid, overlap)
-    steps = [*conditioning_steps, fitting, filling, resampling]
+    steps = [step for step in (*conditioning_steps, fitting, filling, resampling) if step]
     for axis, (cells, overlap_cells) in enumerate(zip(grid.cells, overlap, strict=True)):
         if overlap_cells:
             before = _height_statistics(heights, grid)
@@ -172,6 +174,21 @@ def _scale(heights: Field, sq: float | None, name: str) -> tuple[Field, str]:
         f"removed the mean and scaled the heights by {sq / natural_sq:.4g}, "
         f"from Sq {length_text(natural_sq)} to {length_text(sq)}"
     )
+
+
+def step_sentence(step: str) -> str:
+    """Return a step of the preparation as a sentence with a subject, for notes.
+
+    Examples
+    --------
+    >>> from asperity.surface import step_sentence
+    >>> step_sentence("filled 2 % missing cells by harmonic interpolation")
+    'The preparation filled 2 % missing cells by harmonic interpolation.'
+    """
+    verb = step.partition(" ")[0]
+    subject = "The surface" if verb == "has" else "The preparation" if verb in _VERBS else ""
+    sentence = f"{subject} {step}" if subject else f"{step[:1].upper()}{step[1:]}"
+    return f"{sentence.rstrip('.')}."
 
 
 def count_places(measured: MeasuredSurface, grid: Grid, *, turn: bool = False) -> int:
@@ -283,7 +300,7 @@ def _fill(heights: Field, measured: MeasuredSurface, max_missing: float) -> tupl
     missing = ~np.isfinite(heights)
     share = float(np.mean(missing))
     if share == 0.0:
-        return heights, "found no missing cells to fill"
+        return heights, ""
     if share > max_missing:
         raise BadInput(
             f"{measured.name} misses {100.0 * share:.3g} % of the cells in the part used, more "

@@ -74,7 +74,7 @@ class Column:
 
     def heading(self) -> list[str]:
         """Return the lines of the title."""
-        return wrap(self.title, max(TITLE, self.width)) if self.title else []
+        return _heading(self.title, max(TITLE, self.width))
 
     def lines(self, text: Sequence[str], height: int, *, bottom: bool = False) -> list[str]:
         """Return lines of a cell or title, aligned and filled to a height."""
@@ -111,9 +111,15 @@ def layout(
         yield from _table(part, len(rows))
 
 
+def _heading(title: str, width: int) -> list[str]:
+    """Return the lines of a title; a number stays with its unit."""
+    lines = wrap(UNIT.sub("\1", title), width, break_on_hyphens=True)
+    return [line.replace("\1", " ") for line in lines]
+
+
 def _column(title: str, cells: list[str], flush_left: bool) -> Column:
     width = max(map(len, cells), default=1)
-    heading = wrap(title, max(TITLE, width))
+    heading = _heading(title, max(TITLE, width))
     return Column(title, cells, max(width, *map(len, heading), 1), flush_left or not title)
 
 

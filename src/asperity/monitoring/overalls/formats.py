@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas
 
-from asperity.core.errors import BadInput, UnreadableFile
+from asperity.core.errors import BadInput, UnreadableFile, install_text
 from asperity.core.files import require_file
 from asperity.core.sandbox import read_in_subprocess
 from asperity.core.third_party import first_line
@@ -51,7 +51,7 @@ def read_table(path: Path) -> pandas.DataFrame:
         else:
             table = _read_json(path) if suffix in (".jsonl", ".ndjson") else _read_csv(path)
     except ImportError:
-        remedy = "pip install 'asperity[recordings]', or write a .csv"
+        remedy = f"{install_text('recordings')}, or write a .csv"
         raise BadInput(f"{path.name} needs pyarrow; {remedy}") from None
     except BadInput:
         raise

@@ -57,6 +57,7 @@ def render_inference_page(
             Tile(
                 heading(quantity(key)),
                 quantity(key).number(posterior[key].median),
+                f"{quantity(key).display} "
                 f"({quantity(key).interval(posterior[key].low, posterior[key].high)})",
             )
             for key in KEY_QUANTITIES

@@ -1,11 +1,12 @@
 """HTML report of a machine: verdict, drawing, contacts, ratings and the worst contact."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from asperity.core.quantities import NO_VALUE, Quantity, quantity
-from asperity.machines import MachineResult, Rating
+from asperity.core.documents import Table
+from asperity.core.quantities import NO_VALUE, Quantity, mark_rolling, quantity
+from asperity.machines import MachineResult, Rating, merge_symmetric
 from asperity.report.base import Exhibit, heading, render, tile, write_page
 from asperity.report.machine.contact_path import SOLVED, along_path, fatigue_over_depth
 from asperity.report.machine.sketch import machine_sketch
@@ -20,6 +21,16 @@ CONDITIONS = (
     ("slide_to_roll", "slide_to_roll"),
     ("p_hertz_pa", "hertz_pressure_pa"),
 )
+DRAWN = "friction_power_w"  # in the figure, but not in the table, which would be too wide
+HEADS = {  # shorter than the names of the catalogue
+    "u1_m_s": "u₁",
+    "u2_m_s": "u₂",
+    "line_load_n_m": "line load",
+    "slide_to_roll": "slide-to-roll",
+    "p_hertz_pa": "p Hertz",
+    "flash_temperature_max_k": "flash",
+    "von_mises_core_pa": "core von Mises",
+}
 TILES = (
     "clr",
     "h_central_m",
@@ -63,21 +74,23 @@ def machine_exhibits(result: MachineResult) -> list[Exhibit]:
 
 def _page(result: MachineResult, opened: str | None) -> str:
     keys = [
-        (key, quantity(name)) for key, name in (*CONDITIONS, *SOLVED) if _has_values(result, key)
+        (key, quantity(name))
+        for key, name in (*CONDITIONS, *SOLVED)
+        if key != DRAWN and result.has_values(key)
     ]
+    worst = mark_rolling(result.worst, rolling=result.worst["slide_to_roll"] == 0.0)
     return render(
         "machine/page.html.j2",
         title=result.case.machine.title(),
         result=result,
         standing=result.run is not None and result.run.is_snapshot,
         failures=result.failures,
-        tiles=[
-            tile(quantity(key), result.worst) for key in TILES if result.worst.get(key) is not None
-        ],
+        tiles=[tile(quantity(key), worst) for key in TILES if worst.get(key) is not None],
         sketch=machine_sketch(result).picture(),
         path=along_path(result).picture() if len(result.rows) > 1 else None,
         heads=[(_head(key, entry), entry.display) for key, entry in keys],
-        rows=[(row, [_cell(row, key, entry) for key, entry in keys]) for row in result.rows],
+        rows=_table(result, keys),
+        rolling=sum(row["slide_to_roll"] == 0.0 for row in result.rows),
         ratings=[_rating_view(rating) for rating in result.ratings],
         worst=[exhibit.picture() for exhibit in _worst(result)],
         run=result.run,
@@ -89,15 +102,34 @@ def _page(result: MachineResult, opened: str | None) -> str:
     )
 
 
-def _has_values(result: MachineResult, key: str) -> bool:
-    return any(row.get(key) is not None for row in result.rows)
-
-
 def _head(key: str, entry: Quantity) -> str:
-    return {"u1_m_s": "u₁", "u2_m_s": "u₂"}.get(key, entry.short)
+    return HEADS.get(key, entry.short)
 
 
-def _cell(row: dict[str, object], key: str, entry: Quantity) -> str:
+class _Line(NamedTuple):
+    """A row of the table of contacts, for one contact or for several equal ones."""
+
+    name: str
+    cells: Sequence[str]
+    reason: str
+    worst: bool
+
+
+def _table(result: MachineResult, keys: Sequence[tuple[str, Quantity]]) -> list[_Line]:
+    """Return a row per contact, one for those that are equal by symmetry."""
+    table = []
+    for row in result.rows:
+        marked = mark_rolling(row, rolling=row["slide_to_roll"] == 0.0, mark=NO_VALUE)
+        cells = [_cell(marked, *key) for key in keys]
+        table.append((str(row["name"]), [*cells, str(row.get("reason") or "")]))
+    worst = [row["name"] for row in result.rows].index(result.worst["name"])
+    return [
+        _Line(name, table[rows[0]][1][:-1], table[rows[0]][1][-1], worst in rows)
+        for name, rows in merge_symmetric(table)
+    ]
+
+
+def _cell(row: Table, key: str, entry: Quantity) -> str:
     """Return a number with its interval, if the row has one."""
     return entry.number_in(row) if key == entry.key else entry.number(row.get(key))
 

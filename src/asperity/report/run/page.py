@@ -5,8 +5,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
+from asperity.core.documents import Table
 from asperity.core.errors import BadInput
-from asperity.core.quantities import quantity, select
+from asperity.core.quantities import mark_rolling, quantity, select
 from asperity.ehl import Convergence
 from asperity.lubricant import Newtonian
 from asperity.report.base import (
@@ -159,7 +160,7 @@ class _RunView(NamedTuple):
     label: str
     anchor: str
     run: Run
-    scalars: dict[str, float | int | bool | None]
+    scalars: Table
     convergence: Convergence
     tiles: list[Tile]
     pictures: list[Picture]
@@ -169,7 +170,8 @@ class _RunView(NamedTuple):
 
 
 def _view(run: Run, number: int, numbered: bool) -> _RunView:
-    scalars = run.scalars()
+    rolling = run.solution.conditions.sliding_speed == 0.0
+    scalars = mark_rolling(run.scalars(), rolling=rolling)
     shown = SHOWN_OF_SEVERAL if numbered else SHOWN
     pictures = [exhibit.picture() for exhibit in run_exhibits(run)]
     roughness = quantity("sq_m").named(run.state.sq)

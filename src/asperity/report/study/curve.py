@@ -28,6 +28,7 @@ from asperity.study import StudyOverview, WearCurve
 from asperity.trend import Stages
 
 SPLIT_STYLES = ("-.", (0.0, (6.0, 1.5, 1.0, 1.5, 1.0, 1.5)), (0.0, (1.0, 1.0)))
+BOTH = " with both vibration presets: sound, and as printed in the paper"
 MAX_MARKERS = 20  # on a curve
 SHARES = (("clr", "-o", VERMILION), ("car", "--s", BLUE), ("car_domain", "-.^", GREEN))
 
@@ -35,13 +36,16 @@ SHARES = (("clr", "-o", VERMILION), ("car", "--s", BLUE), ("car_domain", "-.^", 
 def curve_exhibits(study: StudyOverview, curve: WearCurve) -> Iterator[Exhibit]:
     """Yield the exhibits of a wear curve in the order of the page."""
     yield shares(study, curve)
-    resonant = [
-        preset for preset in curve.stages if np.isfinite(curve.mean(f"crf_{preset}_hz")).any()
-    ]
+    resonant = _resonant(curve)
     if resonant:
         if study.papers:
             yield rig(curve, resonant[0])
         yield resonance(study, curve)
+
+
+def _resonant(curve: WearCurve) -> list[str]:
+    """Return the vibration presets with a resonance, which alone have something to show."""
+    return [preset for preset in curve.stages if np.isfinite(curve.mean(f"crf_{preset}_hz")).any()]
 
 
 def shares(study: StudyOverview, curve: WearCurve) -> Exhibit:
@@ -101,38 +105,36 @@ def surface_count(study: StudyOverview) -> str:
 
 def resonance(study: StudyOverview, curve: WearCurve) -> Exhibit:
     """Draw CRF and CRFA over Sq for each preset with stages and anchors (Fig 8 of the paper)."""
-    presets = list(curve.stages)
+    presets = _resonant(curve)
     anchors = study.anchors
 
     def draw(medium: Medium) -> Figure:
-        figure = Figure(figsize=(medium.double, 0.62 * medium.double), layout="constrained")
+        width = medium.width(len(presets) + 1)
+        figure = Figure(figsize=(width, 0.62 * medium.double), layout="constrained")
         grid = figure.subplots(2, len(presets), sharex=True, sharey="row", squeeze=False)
         for preset, letters, (upper, lower) in zip(presets, ("ac", "bd"), grid.T, strict=False):
             _draw_preset(upper, lower, curve, anchors, preset)
             medium.title(upper, f"Vibration preset: {preset}", f"({letters[0]}) preset {preset}")
             medium.title(lower, "", f"({letters[1]}) preset {preset}")
-        grid[0, 0].set_ylabel(quantity("crf_hz").label)
-        grid[1, 0].set_ylabel(quantity("crfa").label)
         _limit_rows(grid[0, 0], grid[1, 0], curve, anchors)
-        grid[1, 0].set_ylim(bottom=0.0)
-        legend_of_panels(figure, *grid.flat, columns=4)
+        legend_of_panels(figure, *grid.flat, columns=2 * len(presets))
         return figure
 
-    stages = " ".join(
-        f"Preset {name}: {in_print(stages.verdict)}" for name, stages in curve.stages.items()
-    )
+    stages = " ".join(f"Preset {name}: {in_print(curve.stages[name].verdict)}" for name in presets)
     return Exhibit(
         "resonance",
         draw,
-        "Contact resonance frequency (CRF) and amplitude (CRFA) of the same contacts with both "
-        "vibration presets: sound, and as printed in the paper. Shaded: 90 % interval of the "
+        "Contact resonance frequency (CRF) and amplitude (CRFA) of the same contacts"
+        f"{BOTH if len(presets) > 1 else ''}. Shaded: 90 % interval of the "
         f"split. {legend_note(study)} {stages}",
         f"CRF and CRFA over Sq. {stages}",
     )
 
 
 def _limit_rows(upper: Axes, lower: Axes, curve: WearCurve, anchors: Sequence[Anchor]) -> None:
-    """Limit the axes of CRF and CRFA to their values with all presets, and to the anchors."""
+    """Label the axes of CRF and CRFA; limit them to their values and to the anchors."""
+    upper.set_ylabel(quantity("crf_hz").label)
+    lower.set_ylabel(quantity("crfa").label)
     anchor_values = [anchor.value for anchor in anchors if anchor.quantity in _CRF]
     crf, crfa = (
         [curve.by_case(key.format(preset))[1] for preset in curve.stages]
@@ -140,6 +142,7 @@ def _limit_rows(upper: Axes, lower: Axes, curve: WearCurve, anchors: Sequence[An
     )
     limit_to_data(upper, np.concatenate([anchor_values, *crf]))
     limit_to_data(lower, np.concatenate(crfa))
+    lower.set_ylim(bottom=0.0)
 
 
 _CRF = ("crf_sound_hz", "crf_paper_hz")

@@ -147,6 +147,8 @@ def _tiles(study: StudyOverview) -> list[Tile]:
                 )
     split = quantity("split")
     for preset, stages in curve.stages.items():
+        if stages.kind == "too few":
+            continue
         low, high = (split.number(end) for end in stages.interval)
         value, detail = (
             (split.text(stages.split), f"90 %: {low} to {high}")

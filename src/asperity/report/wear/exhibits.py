@@ -1,6 +1,7 @@
 """Exhibits of a wear history: curves over hours, resonance, surfaces before and after."""
 
 from collections.abc import Sequence
+from textwrap import fill
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +32,7 @@ PANELS: Sequence[tuple[str, tuple[str, ...]]] = (  # quantity of the axis, and o
     ("worn_depth_m", ("worn_depth_1_m", "worn_depth_2_m")),
     ("crfa", ("crfa",)),
 )
+MAX_LABEL = 24  # characters of a line of a panel's axis label
 NAMES = ("First body", "Second body")
 
 
@@ -72,18 +74,15 @@ def curves(history: WearHistory) -> Exhibit:
                 low, high = axes.get_ylim()
                 axes.set_ylim(low, high + 0.25 * (high - low))  # room for the legend
                 axes.legend(loc="upper right", ncols=3)
-            axes.set_ylabel(quantity(side).label)
+            axes.set_ylabel(fill(quantity(side).label, MAX_LABEL))
             axes.set_xlabel(quantity("hours").axis)
         return figure
 
-    k_note = (
-        " Light band: interval of the wear coefficient; it ends where it needs a longer history."
-    )
     return Exhibit(
         "over-hours",
         draw,
         "One point per wear step. Band of CLR: 90 % interval of the mean over the positions of a "
-        "step." + (k_note if history.k_interval is not None else ""),
+        f"step, without the error due to the cells.{_k_note(history)}",
         "Roughness parameters, load and area shares, film, friction, flash temperature, wear depth "
         "and CRFA over hours",
     )
@@ -99,20 +98,30 @@ def headline(history: WearHistory) -> Exhibit:
         _draw_over_hours(axes, history, "clr", VERMILION, "-o")
         title = f"{share.short} {share.number(first)} to {share.text(last)}"
         axes.set(xlabel=quantity("hours").axis, ylabel=share.axis, title=title, ylim=(0.0, None))
+        axes.margins(x=0.02)  # whole markers at both ends
+        axes.autoscale(axis="x")
 
     return Exhibit(
         "load-share",
         draw,
         "Load carried by asperities over the hours. Band: 90 % interval of the mean over the "
-        "positions of a step.",
+        f"positions of a step, without the error due to the cells.{_k_note(history)}",
         f"Asperity load share over hours, from {share.text(first)} to {share.text(last)}.",
     )
+
+
+def _k_note(history: WearHistory) -> str:
+    """Explain the light bands, if there are any."""
+    if history.k_interval is None:
+        return ""
+    return " Light band: interval of the wear coefficient; it ends where it needs a longer history."
 
 
 def _draw_over_hours(axes: Axes, history: WearHistory, key: str, colour: str, style: str) -> None:
     hours = history.table["hours"].to_numpy(float)
     factor = quantity(key).factor
-    label = quantity(key).short if quantity(key).symbol else quantity(key).title
+    _, _, body = quantity(key).short.partition(" of body ")
+    label = f"body {body}" if body else quantity(key).short
     axes.plot(hours, factor * history.table[key].to_numpy(float), style, color=colour, label=label)
     if key == "clr":
         low, high = (

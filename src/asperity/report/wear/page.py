@@ -7,10 +7,19 @@ from typing import NamedTuple
 
 import pandas
 
-from asperity.core.quantities import in_print, quantity
+from asperity.core.quantities import in_print, mark_rolling, quantity
 from asperity.paper import is_papers_contact
 from asperity.report import animated_maps
-from asperity.report.base import Exhibit, Picture, heading, render, tile, write_exhibits, write_page
+from asperity.report.base import (
+    Exhibit,
+    Picture,
+    Tile,
+    heading,
+    render,
+    tile,
+    write_exhibits,
+    write_page,
+)
 from asperity.report.wear import exhibits
 from asperity.simulation import WearFrame, WearHistory, body_column
 
@@ -97,7 +106,7 @@ def render_wear_page(history: WearHistory) -> str:
         "wear/page.html.j2",
         title="Wear of a contact",
         history=history,
-        tiles=[tile(quantity(key), history.row_at(-1)) for key in TILES if last[key] == last[key]],
+        tiles=_tiles(history),
         headline=exhibits.headline(history).picture(),
         resonance=_resonance(history),
         maps=animated_maps.animated_maps(history.case, scale),
@@ -115,6 +124,13 @@ def render_wear_page(history: WearHistory) -> str:
         script=animated_maps.SCRIPT,
         script_data=animated_maps.script_data(history.frames, captions, scale),
     )
+
+
+def _tiles(history: WearHistory) -> list[Tile]:
+    """Return the final values of the main quantities, where they are known."""
+    values = history.printed_row(-1)
+    row = mark_rolling(values, rolling=history.case.conditions.sliding_speed == 0.0)
+    return [tile(quantity(key), row) for key in TILES if values[key] is not None]
 
 
 def _bodies(last: pandas.Series) -> list[ComparisonRow]:

@@ -328,20 +328,50 @@ class WearHistory(Displayed):
         scalars["stage"] = None if self.stages is None else self.stages.kind
         return scalars
 
+    def printed_row(self, row: int) -> dict[str, float | None]:
+        """Return a row with the intervals that are printed.
+
+        Those of CLR and CRF are of the mean over positions, as the bands in the report, where
+        those for a further position are not determined; without either they are left out.
+        """
+        values = self.row_at(row)
+        if values["clr_low"] is None:
+            ends = {end: end.replace("_mean", "") for end in RESONANCE if "_mean" in end}
+            ends |= {RESONANCE[end]: RESONANCE[printed] for end, printed in ends.items()}
+            values |= {printed: values[end] for end, printed in ends.items()}
+            if values["clr_low"] is None:
+                values = {key: values[key] for key in values if key not in ends.values()}
+                values["crf_std_hz"] = None
+        return values
+
+    def _interval_words(self) -> str:
+        """Return the end of the verdict where the intervals are not those for a further position.
+
+        It is empty where they are.
+        """
+        if self.row_at(-1)["clr_low"] is not None:
+            return ""
+        known = "clr_low" in self.printed_row(-1)
+        return "; 90 % intervals " + (
+            "of the mean over positions" if known else "are not determined"
+        )
+
     def verdict(self) -> str:
         """Return one sentence: worn depths, and changes of Sq, CLR and CRF."""
-        first, last = self.row_at(0), self.row_at(-1)
+        first, last = self.row_at(0), self.printed_row(-1)
         depths = " and ".join(
-            quantity("worn_depth_m").text(last[body_column("worn_depth_m", body)])
-            for body in BODIES
+            _depth_text(last[body_column("worn_depth_m", body)] or 0.0) for body in BODIES
         )
         changes = ", ".join(
-            f"{quantity(key).short} {quantity(key).number_in(first)} to "
+            f"{quantity(key).short} {quantity(key).number(first[key])} to "
             f"{quantity(key).text_in(last)}"
             for key in ("sq_m", "clr", "crf_hz")
             if last[key] is not None and first[key] is not None
         )
-        return f"After {self.hours:.4g} h the bodies have worn by {depths}: {changes}."
+        return (
+            f"After {self.hours:.4g} h the bodies have worn by {depths}: {changes}"
+            f"{self._interval_words()}."
+        )
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -349,6 +379,11 @@ class WearHistory(Displayed):
         model = self.contact.model
         contact = self.contact
         notes = [*self.remarks, *self.case.notes]
+        if self.row_at(-1)["clr_low"] is None:
+            notes.append(
+                "The 90 % intervals of CLR and CRF for a further position, which include the error "
+                "due to the cells, are not determined."
+            )
         if model.overrolling is None:
             rates = " and ".join(f"{rate:.4g}" for rate in contact.overrolling)
             notes.append(
@@ -371,3 +406,8 @@ class WearHistory(Displayed):
             else "Only removal is modelled, no roughening."
         )
         return tuple(notes)
+
+
+def _depth_text(depth: float) -> str:
+    """Return a depth with three digits, below 0.1 µm in nm."""
+    return f"{1e9 * depth:.3g} nm" if abs(depth) < 1e-7 else f"{1e6 * depth:.3g} µm"
