@@ -166,6 +166,83 @@ def test_a_row_that_another_program_wrote_is_named_and_not_used(place, name):
     assert (failed, again) == ((), judgement)
 
 
+TRIGGERS = [
+    "AFTER INSERT ON recording BEGIN INSERT INTO judgement (sensor, time, state, since) VALUES "
+    "(NEW.sensor, NEW.arrived, 'acknowledged', 's-027.npz'); END",
+    "BEFORE INSERT ON judgement BEGIN SELECT (WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT "
+    "x + 1 FROM c) SELECT count(*) FROM c); END",
+    "BEFORE INSERT ON recording BEGIN SELECT RAISE(IGNORE); END",
+    "AFTER INSERT ON judgement BEGIN UPDATE judgement SET state = 'ok'; END",
+    "AFTER INSERT ON call BEGIN UPDATE call SET answered = 'now'; END",
+]
+
+
+@pytest.mark.parametrize("trigger", TRIGGERS)
+def test_a_trigger_of_another_program_is_removed_before_it_acts(place, trigger):
+    expected = watched(place)[1]
+    change(place, f'CREATE TRIGGER "planted ""one""" {trigger}')
+    change(place, "DELETE FROM recording WHERE id = 28")  # is read again, and inserted
+    with pytest.raises(UnreadableFile, match="a trigger of another program"):
+        store_overview(place / STORE)
+    failed, judgement = watched(place)
+    assert "a trigger of another program, removed" in " ".join(failed)
+    assert judgement == expected
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "DELETE FROM sensor",
+        "DELETE FROM point",
+        "ALTER TABLE recording RENAME COLUMN state TO st",
+        "ALTER TABLE judgement DROP COLUMN verdict",
+        "DROP TABLE call",
+        "CREATE TRIGGER planted BEFORE INSERT ON judgement BEGIN SELECT RAISE(ABORT, 'no'); END",
+    ],
+)
+@pytest.mark.parametrize("running", [False, True])
+def test_a_changed_structure_is_named_and_the_alarm_stays(place, statement, running):
+    watching = WatchSettings(poll_interval_s=0.0, settle_time_s=0.0, machine="mill", point="outer")
+    watch = open_watch((place / "in").resolve(), Store(place / STORE), TrackSettings(), watching)
+    with closing(watch):
+        watch.check()
+        if running:
+            change(place, statement)
+            update = watch.check()
+    if not running:
+        change(place, statement)
+        watch = open_watch(
+            (place / "in").resolve(), Store(place / STORE), TrackSettings(), watching
+        )
+        with closing(watch):
+            update = watch.check()
+    assert "was damaged" in " ".join(update.failed)
+    assert content(update)["alarm"]["state"] == "alarm"
+
+
+def test_sensors_do_not_take_over_recordings_whose_sensor_is_missing(place, tmp_path):
+    (tmp_path / "quiet").mkdir()
+    for number in range(12):
+        values = np.random.default_rng(number).standard_normal(2000)
+        np.savez(tmp_path / f"quiet/q-{number:03}.npz", acc=values, fs=20e3, unit="m/s^2")
+    for table in ("machine", "point", "sensor"):
+        change(place, f"DELETE FROM {table}")
+    watching = WatchSettings(once=True, settle_time_s=0.0, machine="fan", point="rear")
+    watch = open_watch(tmp_path / "quiet", Store(place / STORE), TrackSettings(), watching)
+    with closing(watch):
+        update = watch.check()
+    assert "rows of a sensor that is missing" in update.failed[0]
+    assert len(content(update)["recordings"]) == 12
+    assert content(update)["alarm"]["state"] != "alarm"
+
+
+def test_an_emptied_store_is_named(place):
+    (place / STORE).write_bytes(b"")
+    failed, judgement = watched(place)
+    assert failed[0].endswith("was empty; recordings are read again")
+    assert json.loads(judgement)["alarm"]["state"] == "alarm"
+
+
 def test_a_damaged_recording_without_its_file_is_named(place):
     change(place, "UPDATE recording SET file = '/gone/s-001.npz' WHERE id = 2")
     (failed,) = watched(place)[0]
@@ -229,6 +306,8 @@ def test_a_store_of_the_former_version_gets_digests(place):
             connection.execute(f"ALTER TABLE {table} DROP COLUMN digest")
         connection.execute("ALTER TABLE sensor DROP COLUMN content_digest")
         connection.execute("PRAGMA user_version = 4")
-    assert watched(place) == ((), expected)
+    (remark,), judgement = watched(place)
+    assert remark.endswith("was converted from version 4, as it was")
+    assert judgement == expected
     change(place, "UPDATE recording SET state = 'ok' WHERE id = 27")
     assert "s-026.npz" in watched(place)[0][0]

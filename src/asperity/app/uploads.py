@@ -77,7 +77,7 @@ class FileDrop(FileDropper):  # type: ignore[misc]
         """Write a chunk to disk, instead of keeping it in memory as Panel does."""
         if event.event_name != "upload_event":
             return
-        chunk = event.data
+        chunk = event.data if isinstance(event.data, dict) else {}
         name = str(chunk.get("name", ""))
         data = chunk.get("data", b"")
         try:

@@ -28,8 +28,8 @@ PASSWORD = "ASPERITY_PAGE_PASSWORD"
 MIN_PASSWORD = 8  # characters
 MAX_BODY = 1000  # bytes of a request's body; uploads come by websocket
 WRONG_PASSWORD_S = 1.0  # time that a wrong password takes, one at a time for all visitors
-MAX_WAITING = 5  # passwords that wait, of one address
-WILDCARDS = ("0.0.0.0", "::")  # addresses for all network interfaces
+MAX_WAITING, MAX_WAITING_IN_ALL = 5, 20  # passwords that wait, of one address and of all
+EVERY_INTERFACE = "0.0.0.0"
 HEADERS = {
     "Content-Security-Policy": "frame-ancestors 'none'",
     "X-Frame-Options": "DENY",
@@ -72,18 +72,14 @@ def password_for(address: str) -> str | None:
 
 def host_names(address: str, port: int) -> set[str]:
     """Return the values of `Host` that name a server on this address."""
-    names = {LOCALHOST, "localhost", "[::1]"}
-    if address in WILDCARDS:
+    names = {LOCALHOST, "localhost"}
+    if address == EVERY_INTERFACE:
         host = socket.gethostname().lower()
         names |= {host, f"{host}.local", socket.getfqdn().lower()}
     elif not is_local(address):
-        names = {_bracketed(address.lower())}
+        names = {address.lower()}
     with_port = {f"{name}:{port}" for name in names}
     return names | with_port if port == 80 else with_port  # browsers omit port 80
-
-
-def _bracketed(address: str) -> str:
-    return f"[{address}]" if ":" in address else address
 
 
 class AccessPolicy:
@@ -104,13 +100,13 @@ class AccessPolicy:
         self.password = password
         self._address, self._port, self._pages = address, port, pages
         self._names = host_names(address, port)
-        self._any_interface = address in WILDCARDS
+        self._any_interface = address == EVERY_INTERFACE
         self._guess = asyncio.Lock()
         self._waiting: Counter[str] = Counter()
 
     def printed_address(self) -> str:
         """Return the address that admits its visitor."""
-        name = LOCALHOST if self._any_interface else _bracketed(self._address)
+        name = LOCALHOST if self._any_interface else self._address
         return f"http://{name}:{self._port}/?token={self.token}"
 
     def install(self, application: Application) -> None:
@@ -144,8 +140,7 @@ class AccessPolicy:
         stream = getattr(request.connection, "stream", None)
         if not self._any_interface or stream is None or stream.socket is None:
             return set()
-        address = str(stream.socket.getsockname()[0]).removeprefix("::ffff:")
-        return {f"{_bracketed(address)}:{self._port}"}
+        return {f"{stream.socket.getsockname()[0]}:{self._port}"}
 
     def page_address(self, request: HTTPServerRequest) -> str:
         """Return the requested page and its settings without the token; "/" for other paths."""
@@ -166,7 +161,7 @@ class AccessPolicy:
         tornado.web.HTTPError
             429 if too many of this address wait.
         """
-        if self._waiting[address] >= MAX_WAITING:
+        if self._waiting[address] >= MAX_WAITING or self._waiting.total() >= MAX_WAITING_IN_ALL:
             raise HTTPError(429)
         self._waiting[address] += 1
         try:

@@ -1,8 +1,10 @@
 """Server of the live page: local by default, one document per visit, no external resources."""
 
+import errno
 import logging
 import socket
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from importlib.metadata import version
 from importlib.resources import files
@@ -42,13 +44,21 @@ CONNECTION_CHECK_MS = 50  # interval, until the browser of a visit is connected
 READY_MS = 4000  # figures are created after this time even without a ready event
 UNUSED_MS = 120_000  # lifetime of a session before its browser connects
 PING_S = 120  # interval of keep-alive pings, and the time to answer
+HTTP_LIMITS = {  # sizes [bytes], and times [s] after which a silent connection is closed
+    "max_body_size": MAX_BODY,
+    "max_header_size": 16_384,
+    "idle_connection_timeout": 20,
+    "body_timeout": 10,
+}
 MAX_MESSAGE = 24_000_000  # bytes that a browser may send at a time
 
 
 def require_free(address: str, port: int) -> int:
     """Return the port, or a free one for 0; raise BadInput if it is not available."""
+    if ":" in address:
+        raise BadInput(f"--listen needs an IPv4 address or a host name, got {address}; use 0.0.0.0")
     try:
-        with socket.socket(socket.AF_INET6 if ":" in address else socket.AF_INET) as probe:
+        with socket.socket() as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             probe.bind((address, port))
             return int(probe.getsockname()[1])
@@ -203,18 +213,28 @@ class PageSite:
 
 
 class _DisconnectFilter(logging.Filter):
-    """Drops log records about visitors that disconnect during a message."""
+    """Drops log records about visitors that disconnect, and about too many connections."""
 
     def filter(self, record: logging.LogRecord) -> bool:
         """Return True for a record to keep."""
-        return not (
-            record.exc_info and record.exc_info[0] in (WebSocketClosedError, StreamClosedError)
-        )
+        kind, error = (record.exc_info or (None, None))[:2]
+        too_many = isinstance(error, OSError) and error.errno == errno.EMFILE
+        return not (too_many or kind in (WebSocketClosedError, StreamClosedError))
+
+
+def _allow_open_files() -> None:
+    """Allow as many open files, which connections are, as the system permits."""
+    with suppress(ImportError, OSError, ValueError):
+        import resource
+
+        _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
 
 
 def _limit_logging() -> None:
     """Log errors, not connections and disconnections."""
     logging.getLogger("asyncio").addFilter(_DisconnectFilter())
+    logging.getLogger("tornado.application").addFilter(_DisconnectFilter())
     for name in ("bokeh.server.util", "bokeh.server.views.ws", "tornado.access"):
         logging.getLogger(name).setLevel(logging.ERROR)
 
@@ -284,6 +304,7 @@ def serve_page(
         for a port in use, an address of another machine, or a missing password.
     """
     _limit_logging()
+    _allow_open_files()
     password = password_for(listen)
     port = require_free(listen, port)
     worker_pool = WorkerPool()
@@ -307,7 +328,7 @@ def serve_page(
             check_unused_sessions_milliseconds=CLEANUP_MS,
             unused_session_lifetime_milliseconds=UNUSED_MS,
             websocket_max_message_size=MAX_MESSAGE,
-            http_server_kwargs={"max_body_size": MAX_BODY},
+            http_server_kwargs=HTTP_LIMITS,
         )
         policy = AccessPolicy(listen, port, list(site.pages()), password)
         policy.install(server._tornado)

@@ -19,6 +19,8 @@ from asperity.core.files import new_part, require_writable
 from asperity.monitoring.store.digests import add_function, damaged_rows, keep_digests
 from asperity.monitoring.store.repair import (
     DamagedStore,
+    foreign_triggers,
+    has_orphans,
     repair_rows,
     require_intact,
     set_aside,
@@ -29,6 +31,7 @@ from asperity.trend import AlarmState
 STORE = "asperity.db"
 BUSY_S = 30.0  # timeout while another process writes [s]
 MISSING_S = 60.0  # time after which a missing folder of the store is made again [s]
+SCHEMA_ERRORS = ("no such", "duplicate column", "already exists")  # in messages of SQLite
 REMEDY = "delete it, and its recordings are read again, or choose another store"
 
 
@@ -127,6 +130,7 @@ class Store:
         if not self._in_memory:
             require_writable(self.path)
         location = ":memory:" if self._in_memory else self.path
+        self._was_empty = self.path.is_file() and self.path.stat().st_size == 0
         with self._translated_errors():
             self._connection = sqlite3.connect(location, timeout=BUSY_S, isolation_level=None)
             try:
@@ -155,8 +159,7 @@ class Store:
         if version == 0:
             self._create()
         elif version in range(1, VERSION):
-            with self.transaction() as run:
-                convert_tables(run)
+            self._convert(version)
         elif version != VERSION:
             raise UnreadableFile(
                 f"{self.path} is a store of version {version}, this asperity writes {VERSION}; "
@@ -165,14 +168,41 @@ class Store:
         require_intact(self._connection)
         keep_digests(self._connection)
         self._version_checked: int | None = None
-        self.check_rows()
+        self._check_rows()
+
+    def _convert(self, version: int) -> None:
+        """Convert a store of an older version, whose content cannot be verified."""
+        try:
+            with self.transaction() as run:
+                convert_tables(run)
+        except StoreUnavailable as error:
+            if any(text in str(error) for text in SCHEMA_ERRORS):
+                raise DamagedStore(f"it is not a store of version {version}") from None
+            raise
+        self.remarks.append(f"{self.path} was converted from version {version}, as it was")
 
     def take_remarks(self) -> list[str]:
         """Return what has been repaired since the last call."""
         remarks, self.remarks = self.remarks, []
         return remarks
 
-    def check_rows(self) -> None:
+    def check_changes(self) -> None:
+        """Repair what another program has changed in the open file, and count it in `repairs`.
+
+        Raises
+        ------
+        UnreadableFile
+            if something is damaged and the store is not to be repaired.
+        """
+        try:
+            self._check_rows()
+        except DamagedStore as error:
+            self._connection.close()
+            self.remarks.append(set_aside(self.path, str(error)))
+            self._open()
+            self.repairs += 1
+
+    def _check_rows(self) -> None:
         """Remove damaged rows if another program has written since, and count it in `repairs`.
 
         Raises
@@ -184,7 +214,12 @@ class Store:
         if version == self._version_checked:
             return
         with self._translated_errors():
-            damaged = any(damaged_rows(self._connection))
+            require_intact(self._connection, whole=False)
+            damaged = (
+                bool(foreign_triggers(self._connection))
+                or has_orphans(self._connection)
+                or any(damaged_rows(self._connection))
+            )
         if damaged:
             with self.transaction():
                 remarks = repair_rows(self._connection, str(self.path))
@@ -273,6 +308,8 @@ class Store:
         with self.transaction() as run:
             if run("PRAGMA user_version").fetchone()[0] == VERSION:
                 return  # another process was faster
+            if not self._in_memory and self.path.is_file() and self._was_empty:
+                self.remarks.append(f"{self.path} was empty; recordings are read again")
             if run("SELECT count(*) FROM sqlite_master").fetchone()[0]:
                 raise UnreadableFile(
                     f"{self.path} is a database of another program; choose another store"

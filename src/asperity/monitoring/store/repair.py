@@ -19,17 +19,27 @@ class DamagedStore(Exception):
     """A file whose structure is damaged."""
 
 
-def require_intact(connection: sqlite3.Connection) -> None:
-    """Raise DamagedStore if the structure of a store's file is damaged.
+def require_intact(connection: sqlite3.Connection, *, whole: bool = True) -> None:
+    """Raise DamagedStore if tables or, with `whole`, the structure of a store are damaged.
 
     Raises
     ------
     sqlite3.DatabaseError
         if it cannot be told to be a store.
     """
-    names = connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'").fetchall()
-    if not {group.table for group in GROUPS} <= {name for (name,) in names}:
+    tables = {group.table for group in GROUPS}
+    kinds = dict(connection.execute("SELECT name, type FROM sqlite_master").fetchall())
+    if not tables & {*kinds}:
         raise sqlite3.DatabaseError("tables are missing")
+    for table in tables:
+        if kinds.get(table) != "table":
+            raise DamagedStore(f"the table {table} is missing")
+    for group in GROUPS:
+        columns = {row[1] for row in connection.execute(f"PRAGMA table_info({group.table})")}
+        if not {group.digest, *group.key, *group.columns} <= columns:
+            raise DamagedStore(f"columns of the table {group.table} are missing")
+    if not whole:
+        return
     try:
         ((result, *_),) = connection.execute("PRAGMA integrity_check(1)").fetchall()
     except sqlite3.OperationalError:
@@ -38,6 +48,17 @@ def require_intact(connection: sqlite3.Connection) -> None:
         raise DamagedStore(str(error)) from error
     if result != "ok":
         raise DamagedStore(" ".join(str(result).split()))
+
+
+def foreign_triggers(connection: sqlite3.Connection) -> list[str]:
+    """Return the names of triggers in the file; a store's own are not part of it."""
+    query = "SELECT name FROM sqlite_master WHERE type = 'trigger'"
+    return [name for (name,) in connection.execute(query)]
+
+
+def has_orphans(connection: sqlite3.Connection) -> bool:
+    """Return True if rows refer to a sensor, point or machine that does not exist."""
+    return connection.execute("PRAGMA foreign_key_check").fetchone() is not None
 
 
 def set_aside(path: Path, reason: str) -> str:
@@ -59,17 +80,28 @@ def repair_rows(connection: sqlite3.Connection, name: str) -> list[str]:
     Removed recordings are read again from their files, and judged again. Runs in a transaction of
     the caller.
     """
+    sentences = []
+    for trigger in foreign_triggers(connection):
+        quoted = trigger.replace('"', '""')
+        connection.execute(f'DROP TRIGGER "{quoted}"')
+        sentences.append("a trigger of another program, removed")
     groups = {(row.group.table, row.group.digest) for row in damaged_rows(connection)}
-    if not groups:
-        return []
     former = connection.text_factory
     connection.text_factory = lambda text: text.decode(errors="replace")
     try:
-        sentences = _repair_sensors(connection)
+        sentences += _repair_sensors(connection)
         for key in sorted(groups):
             sentences += _repair_group(connection, BY_DIGEST[key])
+        removed = connection.execute(
+            "DELETE FROM gap WHERE recording NOT IN (SELECT id FROM recording WHERE sensor IN "
+            "(SELECT id FROM sensor))"
+        ).rowcount
         for table in OF_SENSOR:
-            connection.execute(f"DELETE FROM {table} WHERE sensor NOT IN (SELECT id FROM sensor)")
+            removed += connection.execute(
+                f"DELETE FROM {table} WHERE sensor NOT IN (SELECT id FROM sensor)"
+            ).rowcount
+        if removed:
+            sentences.append(f"{removed} rows of a sensor that is missing, removed")
     finally:
         connection.text_factory = former
     return [f"{name} was damaged: {sentence}" for sentence in sentences]

@@ -144,7 +144,7 @@ class FolderWatch:
         """Return from a copy in memory to the store, as soon as it can be written."""
         if self._copy is None:
             self.store.require_present()
-            self.store.check_rows()
+            self.store.check_changes()
             if self.store.repairs != self._repairs:
                 self._reopen()
             return
