@@ -392,4 +392,8 @@ def test_nothing_is_wider_than_the_window(browser, server, width):
     page = visit.solved()
     assert page.evaluate("() => document.documentElement.scrollWidth") <= width
     assert page.locator("header").bounding_box()["height"] < 60  # one line
+    page.get_by_role("button", name="Pin to compare").click()
+    page.get_by_text("vs. pinned").first.wait_for()
+    page.get_by_role("img", name="Film minus pinned film").wait_for()
+    assert page.evaluate("() => document.documentElement.scrollWidth") <= width
     visit.close()

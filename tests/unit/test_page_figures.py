@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("panel", reason="the extra page is not installed")
 
 from asperity.app.contact_result import OPEN, ContactMaps
-from asperity.app.contact_tools import Picture
+from asperity.app.contact_tools import PictureButton
 from asperity.app.map_images import DIFFERS, MapImages
 from asperity.app.presets import preset_case
 from asperity.app.settings import Settings
@@ -87,7 +87,7 @@ def test_maps_of_one_instant_state_their_own_contact_area():
 
 
 def test_a_picture_names_case_and_inputs():
-    picture = Picture()
+    picture = PictureButton()
     settings = Settings(preset_case("nu206"), preset="nu206")
     picture.show(settings.with_value("machine.radial_load", "5 kN"))
     data = picture.button.js_event_callbacks["button_click"][0].args["source"].data

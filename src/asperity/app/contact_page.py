@@ -16,7 +16,7 @@ from asperity.app.contact_jobs import (
     open_surface,
 )
 from asperity.app.contact_result import ContactResult, spectrum_title
-from asperity.app.contact_tools import Picture, Sound, link_button
+from asperity.app.contact_tools import PictureButton, Sound, link_button
 from asperity.app.figures import SPECTRUM_HEIGHT, TRIALS_HEIGHT, SpectrumFigure, TrialFigures
 from asperity.app.jobs import JobQueue, VisitPool
 from asperity.app.machine_drawing import MachineDrawing
@@ -96,7 +96,7 @@ class ContactView:
         self.session = ContactSession(settings, coarse, self.draw, full)
         self._side_jobs = JobQueue(worker_pool, deliver)
         self.drawing = MachineDrawing(worker_pool, deliver, tools.draw_machine)
-        self.sound, self.picture = Sound(), Picture()
+        self.sound, self.picture = Sound(), PictureButton()
         self.speeds = SpeedCurve(
             JobQueue(worker_pool, deliver, solves=True), lambda: not self.session.pending
         )

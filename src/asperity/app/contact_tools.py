@@ -67,7 +67,7 @@ def link_button() -> Button:
     return _script_button("Copy link", _COPY)
 
 
-class Picture:
+class PictureButton:
     """Button that saves headline, figures and inputs as a picture."""
 
     def __init__(self) -> None:

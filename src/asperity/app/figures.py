@@ -362,7 +362,7 @@ class SpectrumFigure:
             source=self.then,
             color=GREEN,
             line_dash="dotted",
-            legend_label="pinned, fitted",
+            legend_label="pinned",
         )
         self._pinned = _key_above(self.figure)
 

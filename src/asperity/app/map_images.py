@@ -9,7 +9,7 @@ from bokeh.models import Column
 
 from asperity.app.contact_result import ContactMaps
 from asperity.app.figures import HEIGHT, SECTION_HEIGHT, MapFigures, SectionFigures
-from asperity.app.widgets import sentences, text_block
+from asperity.app.widgets import INHERIT, sentences, text_block
 from asperity.core.quantities import quantity
 
 DIFFERS = "No map of the change in film thickness: the domain or grid differs from the pinned one."
@@ -17,7 +17,7 @@ DIFFERS = "No map of the change in film thickness: the domain or grid differs fr
 
 def placeholder(height: int) -> Column:
     """Reserve the space of a figure, so that the page does not shift when it arrives."""
-    return Column(sizing_mode="stretch_width", min_height=height)
+    return Column(sizing_mode="stretch_width", min_height=height, stylesheets=[INHERIT])
 
 
 class MapImages:
@@ -25,7 +25,7 @@ class MapImages:
 
     def __init__(self) -> None:
         self.film, self.pressure = placeholder(HEIGHT), placeholder(HEIGHT)
-        self.change = Column(sizing_mode="stretch_width", visible=False)
+        self.change = Column(sizing_mode="stretch_width", visible=False, stylesheets=[INHERIT])
         self.cut_pressure, self.cut_film = (
             placeholder(SECTION_HEIGHT),
             placeholder(SECTION_HEIGHT),
