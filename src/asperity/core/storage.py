@@ -8,7 +8,8 @@ import hashlib
 import json
 import os
 import zipfile
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,9 +19,9 @@ import numpy.typing as npt
 
 import asperity
 from asperity.core.documents import Table
-from asperity.core.errors import BadInput, UnreadableFile
+from asperity.core.errors import AsperityError, BadInput, UnreadableFile
 from asperity.core.files import require_file, write_bytes, write_text
-from asperity.core.limits import GIGABYTE, unpacked_limit
+from asperity.core.limits import GIGABYTE, reading_limit, stored_size, unpacked_limit
 from asperity.core.sandbox import read_in_subprocess
 from asperity.core.third_party import first_line
 
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
     import xarray
 
 MANIFEST = "manifest.json"
+ENTRIES = {"versions": dict, "source": str, "case": str, "case_folder": str}  # of a manifest
+MAX_JSON = 64_000_000  # bytes of a manifest
 _MARK, _DIGITS = b"\nasperity-sha256 ", 64
 SEAL, CASE = "seal", "asperity_case"  # keys of the digest and of a table's case
 
@@ -96,6 +99,7 @@ def write_with_digest(path: Path, body: bytes) -> None:
 def read_with_digest(path: Path, remedy: str) -> bytes:
     """Return the bytes that `write_with_digest` wrote; raise UnreadableFile on a mismatch."""
     require_file(path)
+    _require_size(path, remedy)
     try:
         with path.open("rb") as file:  # end first: a file of another type may be too large to read
             body = file.seek(0, os.SEEK_END) - _DIGITS - len(_MARK)
@@ -111,8 +115,24 @@ def read_with_digest(path: Path, remedy: str) -> bytes:
     return content
 
 
-def stored_digest(path: Path) -> str:
-    """Return the digest that a file states at its end, or that of a file without one."""
+def _require_size(path: Path, remedy: str) -> None:
+    """Raise UnreadableFile for a file, such as a sparse one, that is larger than its reading."""
+    size = path.stat().st_size
+    if size > reading_limit(stored_size(path)):
+        raise UnreadableFile(
+            f"{path} has {size / GIGABYTE:.2g} GB, too much for a stored result; {remedy}"
+        )
+
+
+def stored_digest(path: Path, remedy: str) -> str:
+    """Return the digest that a file states at its end, or that of a file without one.
+
+    Raises
+    ------
+    UnreadableFile
+        if the file is too large.
+    """
+    _require_size(path, remedy)
     with path.open("rb") as file:
         file.seek(max(0, file.seek(0, os.SEEK_END) - _DIGITS - len(_MARK)))
         end = file.read()
@@ -257,6 +277,8 @@ def write_json(path: Path, content: Table) -> None:
 def read_json(path: Path, remedy: str) -> dict[str, Any]:
     """Return the object that `write_json` wrote; raise UnreadableFile for anything else."""
     require_file(path)
+    if path.stat().st_size > MAX_JSON:
+        raise UnreadableFile(f"{path} is larger than {MAX_JSON / 1e6:.0f} MB; {remedy}")
     try:
         content = json.loads(path.read_text("utf-8"))
     except (OSError, ValueError, RecursionError):
@@ -282,7 +304,28 @@ def read_manifest(folder: Path, *, of: str, layout: int) -> dict[str, Any]:
             f"{path} is not a {of} manifest that this version of asperity can read; choose another "
             "folder"
         )
+    fits = all(isinstance(manifest.get(name), kind) for name, kind in ENTRIES.items())
+    # a case without a line break would be taken for the name of a file
+    if not fits or "\n" not in manifest["case"] or "asperity" not in manifest["versions"]:
+        raise UnreadableFile(f"{path} is damaged; compute the {of} into another folder")
     return manifest
+
+
+@contextmanager
+def refusing_damaged_content(folder: Path, of: str) -> Iterator[None]:
+    """Raise UnreadableFile for errors that content of another type or shape causes."""
+    try:
+        yield
+    except AsperityError:
+        raise
+    except (
+        *(ArithmeticError, AssertionError, AttributeError, LookupError, OSError, RecursionError),
+        *(TypeError, ValueError),
+    ) as error:
+        raise UnreadableFile(
+            f"{folder} holds a damaged {of} ({first_line(error)[:80]}); compute it into another "
+            "folder"
+        ) from error
 
 
 def require_same_version(manifest: Mapping[str, Any], folder: Path) -> None:

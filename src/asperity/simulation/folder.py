@@ -108,9 +108,12 @@ class RunFolder:
 
     def digests(self, names: Iterable[str]) -> dict[str, str]:
         """Return the digest of each file by its name in the folder; "" for the state."""
-        found = {name: stored_digest(self.path / name) for name in names}
+        found = {name: stored_digest(self.path / name, REMEDY) for name in names}
         # the state is written after the list, and again while a finished run is extended
         return found | ({MEMORY: ""} if (self.path / MEMORY).exists() else {})
+
+    def _is_inside(self, path: Path) -> bool:
+        return path.resolve().is_relative_to(self.path.resolve())
 
     def check_files(
         self, digests: Mapping[str, str], is_surplus: Callable[[str], bool]
@@ -129,10 +132,13 @@ class RunFolder:
             for folder in self.layout.subfolders
             for path in (self.path / folder).glob("[!.]*")
         }
+        for name in digests:
+            if ".." in Path(name).parts or not self._is_inside(self.path / name):
+                raise UnreadableFile(f"{self.path} lists a file outside of it, {name[:60]!r}")
         lost = [name for name in digests if not (self.path / name).is_file()]
         intact = [name for name in digests if name not in lost]
         for name in intact:
-            if digests[name] not in ("", stored_digest(self.path / name)):
+            if digests[name] not in ("", stored_digest(self.path / name, REMEDY)):
                 raise UnreadableFile(
                     f"{self.path / name} is not the file that was stored, or is of another case; "
                     f"remove it, and the {self.layout.contents} is shown without"

@@ -32,6 +32,7 @@ from asperity.core.errors import AsperityError, BadInput, require_positive
 from asperity.core.files import versions
 from asperity.core.notebook import notebook_progress
 from asperity.core.processes import cores, set_up_worker
+from asperity.core.storage import refusing_damaged_content
 from asperity.study.evaluate import DONE, FAILED, FIELDS, Row, TimedBatch, timed_batch
 from asperity.study.maps import require_zarr
 from asperity.study.plan import StudyCase, StudyPlan
@@ -221,10 +222,11 @@ def load_study(folder: str | Path) -> StudyResult:
     UnreadableFile
         if the folder holds no study or is damaged.
     """
-    store = load_study_folder(Path(folder))
-    return StudyResult(
-        store.plan, store.table(), store.folder, store.merged, remarks=store.remarks()
-    )
+    with refusing_damaged_content(Path(folder), "study"):
+        store = load_study_folder(Path(folder))
+        return StudyResult(
+            store.plan, store.table(), store.folder, store.merged, remarks=store.remarks()
+        )
 
 
 @contextmanager

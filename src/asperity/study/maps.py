@@ -50,6 +50,8 @@ def read_maps(folder: Path, study: str, case_id: str) -> dict[str, Field]:
     """Read the maps of a case; UnreadableFile if there are none, or they belong to another case."""
     require_zarr()
     path = folder / MAPS / case_id
+    if any(part.is_symlink() for part in (path.parent, path, *path.rglob("*"))):
+        raise UnreadableFile(f"{path} contains a link, which is not followed; {REMEDY}")
     if not path.is_dir():
         raise UnreadableFile(
             f"{folder} has no maps of case {case_id}; request them with --fields when computing it"

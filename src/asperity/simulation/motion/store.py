@@ -16,7 +16,7 @@ import pyarrow
 from asperity.case import Case
 from asperity.core.errors import BadInput, UnreadableFile
 from asperity.core.quantities import quantity
-from asperity.core.storage import read_netcdf, require_case
+from asperity.core.storage import read_netcdf, refusing_damaged_content, require_case
 from asperity.ehl import FileContents
 from asperity.simulation.folder import (
     FILES,
@@ -52,6 +52,11 @@ def load_history(folder: str | Path) -> History:
         if there is none, or it is damaged.
     """
     folder = Path(folder)
+    with refusing_damaged_content(folder, "history"):
+        return _load(folder)
+
+
+def _load(folder: Path) -> History:
     stored = stored_run(folder, LAYOUT)
     rows, digests = _rows(stored.files)
     if not rows:

@@ -20,6 +20,7 @@ import pandas
 import pyarrow
 
 from asperity.core.errors import UnreadableFile
+from asperity.core.storage import refusing_damaged_content
 from asperity.simulation.folder import (
     FILES,
     MEMORY,
@@ -203,6 +204,11 @@ def load_wear(folder: str | Path) -> WearHistory:
         if there is none, it is damaged, or it is not finished.
     """
     folder = Path(folder)
+    with refusing_damaged_content(folder, "wear history"):
+        return _load(folder)
+
+
+def _load(folder: Path) -> WearHistory:
     case, files, remarks = stored_run(folder, LAYOUT)
     end = files.arrays(END, HistoryEnd.from_arrays)
     if end is None:
