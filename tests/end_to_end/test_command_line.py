@@ -356,7 +356,7 @@ def test_demo_runs_from_case_to_report(asp, monkeypatch):
     monkeypatch.setattr("asperity.paper.papers_text", lambda: fewer)
     code, out, _ = asp("demo", "--out", "shown")
     assert code == 0
-    assert out.startswith("From Sq 0.5 um to 3 um the asperity load share changes from ")
+    assert out.startswith("From Sq 0.5 µm to 3 µm the asperity load share changes from ")
     assert str(Path("shown", "report.html")) in out
     names = {"paper.toml", "report.html", "run-sq-0.5um.nc", "run-sq-1.5um.nc", "run-sq-3um.nc"}
     assert {entry.name for entry in Path("shown").iterdir()} == names
