@@ -198,7 +198,10 @@ def test_a_run_on_a_measured_surface_does_not_need_its_file_again(asp):
         k: v for k, v in first.summary().items() if k != "seconds"
     }
     assert any("removed a quadratic form" in note for note in first.notes)
-    assert "note: The preparation removed a quadratic form" in asp("solve", "run.nc", "--out", "again.nc")[1]
+    assert (
+        "note: The preparation removed a quadratic form"
+        in asp("solve", "run.nc", "--out", "again.nc")[1]
+    )
     assert load_run("again.nc").notes == first.notes
     # a running contact can be read and reported without its map, but solved only with it
     assert asp("report", "running.nc")[0] == 0
