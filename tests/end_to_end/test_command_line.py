@@ -190,7 +190,7 @@ def test_a_run_on_a_measured_surface_does_not_need_its_file_again(asp):
     assert asp(*measured, *chosen, "--out", "running.nc", "--quiet")[0] == 0
     code, out, _ = asp(*measured, "--snapshot", "--out", "run.nc")
     assert code == 0
-    assert "note: removed a quadratic form" in out
+    assert "note: The preparation removed a quadratic form" in out
     first = load_run("run.nc")
     assert first.case.contents.surface.file == "maps/ring.x3p"
     Path("maps/ring.x3p").unlink()
@@ -198,7 +198,10 @@ def test_a_run_on_a_measured_surface_does_not_need_its_file_again(asp):
         k: v for k, v in first.summary().items() if k != "seconds"
     }
     assert any("removed a quadratic form" in note for note in first.notes)
-    assert "note: removed a quadratic form" in asp("solve", "run.nc", "--out", "again.nc")[1]
+    assert (
+        "note: The preparation removed a quadratic form"
+        in asp("solve", "run.nc", "--out", "again.nc")[1]
+    )
     assert load_run("again.nc").notes == first.notes
     # a running contact can be read and reported without its map, but solved only with it
     assert asp("report", "running.nc")[0] == 0
@@ -356,7 +359,7 @@ def test_demo_runs_from_case_to_report(asp, monkeypatch):
     monkeypatch.setattr("asperity.paper.papers_text", lambda: fewer)
     code, out, _ = asp("demo", "--out", "shown")
     assert code == 0
-    assert out.startswith("From Sq 0.5 um to 3 um the asperity load share changes from ")
+    assert out.startswith("From Sq 0.5 µm to 3 µm the asperity load share changes from ")
     assert str(Path("shown", "report.html")) in out
     names = {"paper.toml", "report.html", "run-sq-0.5um.nc", "run-sq-1.5um.nc", "run-sq-3um.nc"}
     assert {entry.name for entry in Path("shown").iterdir()} == names

@@ -67,7 +67,7 @@ def test_traction_rises_from_zero_to_its_limit(asp):
     assert code == 0
     first, second = out.splitlines()[:2]
     assert first.startswith("The largest friction coefficient is 0.0")
-    assert "(Sq 1 um, boundary friction 0.15)" in second
+    assert "(Sq 1 µm, boundary friction 0.15)" in second
     assert out.count("1.91") == 8
     assert "thermal.feedback=true" in out  # the film is hot at 300 % sliding
     assert Path("curve.png").read_bytes().startswith(PNG)

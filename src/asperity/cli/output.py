@@ -48,6 +48,7 @@ def show(
     sentences = [verdict] if isinstance(verdict, str) else verdict
     if as_json:
         taken = {"verdict": " ".join(map(with_options, sentences)), **values()}
+        taken["verdict"] = MICRO.sub("µ", str(taken["verdict"]))  # as it is printed
         if a_line:
             print(_json(taken, indent=None), flush=True)
         else:
