@@ -8,6 +8,7 @@ import pytest
 
 from asperity.case import load_case
 from asperity.core.errors import BadInput, UnreadableFile
+from asperity.core.storage import read_json, write_json
 from asperity.paper import papers_case
 from asperity.simulation import load_history, load_wear, run_history, run_wear
 from asperity.study import load_study, plan_study, run_study, study_verdict
@@ -111,3 +112,65 @@ def test_a_run_without_its_state_is_not_resumed(results, tmp_path):
     worn = load_case(f"{case.text}\n{WEAR}", folder=results, name="wear.toml")
     with pytest.raises(BadInput, match=r"memory\.npz is missing; restore it"):
         run_wear(worn, hours=1.0, out=tmp_path / "wear")
+
+
+def rewritten(folder, **entries):
+    """Write other entries into a manifest, with a valid digest."""
+    manifest = read_json(folder / "manifest.json", "")
+    write_json(folder / "manifest.json", manifest | entries)
+
+
+@pytest.mark.parametrize("kind", ["history", "wear", "study"])
+@pytest.mark.parametrize(
+    "entries",
+    [
+        {"versions": 5},
+        {"versions": {}},
+        {"source": None},
+        {"case": None},
+        {"case": "/etc/passwd"},
+        {"case": [1]},
+        {"case_folder": 5},
+        {"case_folder": "a\0b"},
+        {"case_folder": "\ud800"},
+        {"digest": None, "design": None},
+        {"points": 5, "digest": 5},
+        {"seeds": "x" * 100_000, "digest": 5},
+    ],
+    ids=lambda entries: str(entries)[:40],
+)
+def test_a_manifest_of_other_types_is_refused_in_one_sentence(results, tmp_path, kind, entries):
+    shutil.copytree(results / kind, tmp_path / kind)
+    rewritten(tmp_path / kind, **entries)
+    with pytest.raises(BadInput) as refused:
+        described(kind, tmp_path / kind)
+    assert len(str(refused.value)) < 500
+
+
+def test_a_sparse_manifest_is_not_read(results, tmp_path):
+    shutil.copytree(results / "history", tmp_path / "history")
+    with (tmp_path / "history/manifest.json").open("ab") as file:
+        file.truncate(1 << 40)
+    with pytest.raises(UnreadableFile, match="is larger than 64 MB"):
+        load_history(tmp_path / "history")
+    shutil.copytree(results / "history", tmp_path / "second")
+    with (tmp_path / "second/memory.npz").open("ab") as file:
+        file.truncate(1 << 40)
+    with pytest.raises(UnreadableFile, match="too much for a stored result"):
+        load_history(tmp_path / "second")
+
+
+def test_files_outside_the_folder_are_not_read(results, tmp_path):
+    shutil.copytree(results / "history", tmp_path / "history")
+    frame = tmp_path / "history/fields/step-000001.nc"
+    frame.rename(tmp_path / "outside.nc")
+    frame.symlink_to(tmp_path / "outside.nc")
+    with pytest.raises(UnreadableFile, match="lists a file outside of it"):
+        load_history(tmp_path / "history")
+    shutil.copytree(results / "study", tmp_path / "study")
+    group = next((tmp_path / "study/fields.zarr").glob("*/gap"))
+    group.rename(tmp_path / "gap")
+    group.symlink_to(tmp_path / "gap")
+    study = load_study(tmp_path / "study")
+    with pytest.raises(UnreadableFile, match="contains a link"):
+        study.maps(group.parent.name)

@@ -266,7 +266,7 @@ def test_wrong_passwords_take_a_second_each_however_many_are_sent(remote):
     assert ask(remote, "/contact", {"Cookie": cookie.partition(";")[0]})[0] == 200
 
 
-def test_silent_connections_do_not_stop_the_server(tmp_path):
+def test_idle_connections_do_not_stop_the_server(tmp_path):
     """400 connections without a request, where 256 open files are permitted by default."""
     limits = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (256, limits[1]))
@@ -276,11 +276,11 @@ def test_silent_connections_do_not_stop_the_server(tmp_path):
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, limits)
     port = int(server.host.rpartition(":")[2])
-    silent = [socket.create_connection(("127.0.0.1", port), timeout=5) for _ in range(400)]
+    idle = [socket.create_connection(("127.0.0.1", port), timeout=5) for _ in range(400)]
     assert ask(server, "/contact", server.cookie)[0] == 200
-    silent[0].settimeout(60.0)
-    assert silent[0].recv(1) == b""  # closed by the server
-    for connection in silent:
+    idle[0].settimeout(60.0)
+    assert idle[0].recv(1) == b""  # closed by the server
+    for connection in idle:
         connection.close()
     started.__exit__(None, None, None)
     assert server.log.stat().st_size < 10_000

@@ -237,7 +237,8 @@ def plan_points(
     if realisations < 1:
         raise BadInput(f"seeds must be 1 or more, got {realisations}")
     if explicit is not None and len(set(explicit)) < realisations:
-        raise BadInput(f"seeds must differ from one another, got {', '.join(map(str, explicit))}")
+        given = ", ".join(map(str, explicit[:20]))[:80]
+        raise BadInput(f"seeds must differ from one another, got {given}")
     return StudyPlan(base, tuple(axes), tuple(points), realisations, kind, seeding, explicit)
 
 
