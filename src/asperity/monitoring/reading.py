@@ -341,6 +341,8 @@ def unpack_reading(packed: bytes, name: str) -> Reading:
                 **quality | {name: tuple(quality[name]) for name in ("faults", "remarks")}
             )
         return Reading(spectrum=spectrum, quality=quality, **content)
+    except UnreadableFile:
+        raise
     except Exception as error:
         raise UnreadableFile(f"{name} is not a stored reading; {remedy}") from error
 
