@@ -237,8 +237,7 @@ def plan_points(
     if realisations < 1:
         raise BadInput(f"seeds must be 1 or more, got {realisations}")
     if explicit is not None and len(set(explicit)) < realisations:
-        given = ", ".join(map(str, explicit[:20]))[:80]
-        raise BadInput(f"seeds must differ from one another, got {given}")
+        raise BadInput(f"seeds must differ from one another, got {str(explicit[:20])[1:80]}")
     return StudyPlan(base, tuple(axes), tuple(points), realisations, kind, seeding, explicit)
 
 
