@@ -124,7 +124,7 @@ def _difference(before: str, after: str) -> str:
 
 
 def survives(tree: Path, module: str, mutant: Mutant) -> tuple[bool, float]:
-    """Tell whether the tests of a module pass on a mutant, and the seconds that they took."""
+    """Return whether the tests of a module pass on a mutant, and their duration [s]."""
     path = tree / "src/asperity" / module
     true = path.read_text("utf-8")
     path.write_text(mutant.text, "utf-8")
@@ -176,7 +176,7 @@ def lines(modules: list[str], count: int, seed: int) -> Iterator[str]:
 
 
 def main() -> None:
-    """Run the mutants that the command line asks for."""
+    """Run the requested mutants and print the table."""
     arguments = argparse.ArgumentParser(prog="python -m benchmarks.mutants", description=__doc__)
     arguments.add_argument("--count", type=int, default=12, help="mutants of each module")
     arguments.add_argument("--seed", type=int, default=1)

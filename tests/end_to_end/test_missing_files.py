@@ -32,7 +32,7 @@ def results(tmp_path_factory):
 
 
 def described(kind, folder):
-    """Return the numbers of a result, and what a reader of verdict and report is told."""
+    """Return the numbers of a result, and its verdict or notes."""
     if kind == "study":
         result = load_study(folder)
         remarks = study_verdict(result)

@@ -143,7 +143,7 @@ def test_the_uploads_of_a_visit_are_limited(monkeypatch):
     monkeypatch.setattr(uploads, "MAX_VISIT", 2500)
     drop, paths, errors = drop_of(1000)
     for _ in range(5):
-        drop._process_event(piece(1, 2, b"x" * 800))  # begun again under one name
+        drop._process_event(piece(1, 2, b"x" * 800))  # restarted under one name
     assert len(errors) == 2
     assert "in one visit" in errors[0]
     kept = sum(path.stat().st_size for path in drop.folder.rglob("*.csv"))

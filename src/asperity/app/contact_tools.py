@@ -19,7 +19,7 @@ FADE_S = 0.05  # of the end of a loop into its beginning
 class Sound:
     """Plays the simulated acceleration of the contact as a loop while it is switched on.
 
-    The loudness is relative to the first contact heard, so that louder contacts sound louder.
+    Amplitudes are scaled by that of the first contact played, so that levels can be compared.
     """
 
     def __init__(self) -> None:

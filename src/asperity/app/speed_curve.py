@@ -25,7 +25,7 @@ class SpeedCurve:
     Parameters
     ----------
     queue : runs one point at a time
-    may_solve : tells that nothing else waits for a worker
+    may_solve : returns True if no other job waits for a worker
     """
 
     def __init__(self, queue: JobQueue, may_solve: Callable[[], bool]) -> None:

@@ -120,7 +120,7 @@ class RunFolder:
     ) -> tuple[list[str], tuple[str, ...]]:
         """Return the listed files that are there, and remarks on all that differs from the list.
 
-        `is_surplus` tells which other files a stopped process may have left.
+        `is_surplus` returns True for a file that an interrupted process may have left behind.
 
         Raises
         ------

@@ -38,7 +38,7 @@ HEADERS = {
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
 }  # of every response
-REFUSED_NAME = "This server answers to its own host names only. Open the printed address."
+REFUSED_NAME = "This server accepts its own host names only. Open the printed address."
 REFUSED_VISITOR = "Open the address that asperity page printed; it contains the token."
 
 ENTRANCE = (

@@ -25,7 +25,7 @@ def require_intact(connection: sqlite3.Connection, *, whole: bool = True) -> Non
     Raises
     ------
     sqlite3.DatabaseError
-        if it cannot be told to be a store.
+        if the file is not a store, as far as its tables show.
     """
     tables = {group.table for group in GROUPS}
     kinds = dict(connection.execute("SELECT name, type FROM sqlite_master").fetchall())
