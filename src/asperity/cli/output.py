@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 FIRST_LINE_S, MAX_LINE_DELAY_S = 5.0, 600.0  # between lines of progress without a terminal
 NOTICE_DELAY_S = 2.0  # without a solver step, after which compilation is announced
 
-MICRO = re.compile(r"(?<=\d )u(?=[ms]\b(?![\"']))")  # of a unit, except in a quoted value
+# the u of a unit, except in a quoted value
+MICRO = re.compile(r"(?:(?<=\d )|(?<=per ))u(?=[ms]\b(?![\"']))")
 
 Block = Iterable[str]  # lines, evaluated only when printed
 Row = tuple[str, str]
