@@ -11,7 +11,15 @@ import x3pio
 
 from asperity.app.inputs import case_inputs
 from asperity.app.opening import default_case
-from support.browser import Visit, chromium, click_mark, expect, require_operable, serving
+from support.browser import (
+    Visit,
+    chromium,
+    click_mark,
+    expect,
+    require_operable,
+    serving,
+    write_small_contact,
+)
 
 uploads = pytest.importorskip("asperity.app.uploads", reason="the extra page is not installed")
 
@@ -57,12 +65,8 @@ def browser():
 
 @pytest.fixture(scope="module")
 def server(browser, tmp_path_factory):  # noqa: ARG001 - no server is started without a browser
-    """Serve the default case on fewer cells, which it solves in less time."""
     folder = tmp_path_factory.mktemp("server")
-    few = {"grid.cells": [96, 64], "solver.running_cells": 600}
-    case = default_case().with_overrides(few)
-    (folder / "contact.toml").write_text(case.text, "utf-8")
-    with serving(folder, "contact.toml") as started:
+    with serving(folder, write_small_contact(folder)) as started:
         yield started
 
 

@@ -13,6 +13,8 @@ from urllib.parse import urlsplit
 
 import pytest
 
+from asperity.app.presets import default_case
+
 TIMEOUT_MS = 60_000
 REQUIRED = (  # if this variable is set, as in CI, a missing browser fails the tests
     "ASPERITY_CHROMIUM"
@@ -57,6 +59,12 @@ class Server:
         """Header of a visitor who was admitted."""
         return {"Cookie": f"asperity-{self.host.rpartition(':')[2]}={self.token}"}
 
+    @property
+    def workers(self) -> list[int]:
+        """Identifiers of the worker processes."""
+        pid = self.process.pid
+        return [*map(int, Path(f"/proc/{pid}/task/{pid}/children").read_text("ascii").split())]
+
     def stop(self) -> str:
         """Stop the server with SIGINT, as Ctrl-C does; return its log."""
         self.process.send_signal(2)
@@ -66,6 +74,15 @@ class Server:
             self.process.kill()
             self.process.stdout.close()
         return self.log.read_text("utf-8")
+
+
+def write_small_contact(folder: Path) -> str:
+    """Write the default case on few cells and in pure rolling, without a Stribeck curve; return
+    its name.
+    """
+    few = {"grid.cells": [96, 64], "solver.running_cells": 600, "contact.slip": 0.0}
+    (folder / "contact.toml").write_text(default_case().with_overrides(few).text, "utf-8")
+    return "contact.toml"
 
 
 @contextmanager
