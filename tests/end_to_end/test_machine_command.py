@@ -266,7 +266,7 @@ def test_unsolved_contacts_are_reported(asp):
         (
             "6206",
             "rating.contamination=50",
-            "rating.contamination must lie between 0 and 1, got 50",
+            "from 0 (severe contamination) to 1 (clean), got 50",
         ),
         (
             "fzg-c",

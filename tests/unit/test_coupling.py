@@ -266,7 +266,7 @@ def test_damping_laws_are_eq_5_with_radians_with_hertz_and_a_constant():
 def test_the_contacts_own_damping_needs_a_solved_contact():
     model = VibrationModel(mass=0.1, damping_ratio=0.02, damping_law="contact")
     assert model.needs_solution
-    with pytest.raises(BadInput, match="damping law contact needs the solved contact"):
+    with pytest.raises(BadInput, match='damping law "contact" needs a solved contact'):
         oscillator(state(), CONDITIONS, model)
     assert search_band(CONDITIONS, model) == search_band(CONDITIONS, MODEL)
 

@@ -26,7 +26,7 @@ def test_the_message_gives_the_estimate_and_the_remedy(monkeypatch):
     monkeypatch.setenv("ASPERITY_DAYS", "1.5")
     with pytest.raises(
         BadInput,
-        match=r"a map would take about 2 days, more than the limit of 1\.5; .*ASPERITY_DAYS",
+        match=r"a map would take about 2 days, more than the limit of 1\.5 days; .*ASPERITY_DAYS",
     ):
         require_affordable("a map", seconds=2 * 86400.0)
     require_affordable("a map", memory=1.9e9, seconds=86400.0)

@@ -21,17 +21,17 @@ PLAIN = re.compile(r"^```.*?^```|`[^`]*`", re.MULTILINE | re.DOTALL)
 )
 def test_every_figure_of_a_page_is_listed(page):
     text = PLAIN.sub("", (FOLDER / f"{page}.md").read_text("utf-8"))
-    listed = [row["figure"] for row in FIGURES if row["page"] == page]
+    listed = [row["number"] for row in FIGURES if row["page"] == page]
     for figure in MEASURED.findall(text):
         assert any(figure in entry for entry in listed), (
             f"{page}.md says {figure!r}; name in figures.csv what holds it"
         )
 
 
-@pytest.mark.parametrize("row", FIGURES, ids=lambda row: f"{row['page']}: {row['figure']}")
+@pytest.mark.parametrize("row", FIGURES, ids=lambda row: f"{row['page']}: {row['number']}")
 def test_every_listed_figure_is_on_its_page_and_in_its_source(row):
-    assert row["figure"] in (FOLDER / f"{row['page']}.md").read_text("utf-8")
-    file, _, name = row["held by"].partition("::")
+    assert row["number"] in (FOLDER / f"{row['page']}.md").read_text("utf-8")
+    file, _, name = row["source"].partition("::")
     assert (ROOT / file).is_file()
     if file.endswith(".py"):
         assert name in {function.name for function in functions(parsed(ROOT / file))}

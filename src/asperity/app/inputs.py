@@ -337,11 +337,11 @@ def _names(tables: Table, key: str) -> tuple[str, ...]:
 
 
 def _required_parameters(law: type) -> set[str]:
-    """Return the parameters of a law that have no default."""
+    """Return the names of the parameters of a law that have no default."""
     return {
-        part.name
-        for part in fields(law)
-        if part.default is MISSING and part.default_factory is MISSING
+        field.name
+        for field in fields(law)
+        if field.default is MISSING and field.default_factory is MISSING
     }
 
 

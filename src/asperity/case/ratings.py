@@ -104,6 +104,6 @@ class RatingSection(Section):
             )
         if self.contamination is not None and not 0.0 <= self.contamination <= 1.0:
             raise BadInput(
-                f"rating.contamination must lie between 0 and 1, got {self.contamination:g}; "
-                "correct it"
+                "rating.contamination is e_C of ISO 281, from 0 (severe contamination) to 1 "
+                f"(clean), got {self.contamination:g}"
             )

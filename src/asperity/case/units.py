@@ -247,8 +247,8 @@ def parse_amount(unit: str, value: object, least: float = TINY) -> Amount:
         raise BadInput(f"{expected}, got {quoted(value)}, which is not {_FREQUENCIES[unit]}")
     try:
         si = float(_convert(number, unit_text, unit))
-    except _UnusableUnit as wrong:
-        raise BadInput(f"{expected}, got {quoted(value)}, {wrong}") from None
+    except _UnusableUnit as error:
+        raise BadInput(f"{expected}, got {quoted(value)}, {error}") from None
     if not least <= si < math.inf:
         allowed = "positive and finite" if least == TINY else "finite and not negative"
         raise BadInput(f"must be {allowed}, got {quoted(value)}; correct its sign or value")

@@ -1,7 +1,8 @@
-"""Coverage of every stated interval, 90 %: the one place that sets it.
+"""Coverage of every computed interval, 90 %.
 
-The intervals of a solution's discretisation error (`ERROR_ESTIMATE` in `ehl.controls`) are
-calibrated to the same coverage: calibrate them again when it changes.
+To change it, set `COVERAGE` and `NORMAL_FACTOR`, calibrate `ERROR_ESTIMATE` (`ehl.controls`) again,
+and adapt the stated 90 % limits in `solution.traction` and `lubricant.model` and the texts that say
+90 %.
 """
 
 COVERAGE = 0.90  # share of the intervals that contain the true value

@@ -110,7 +110,7 @@ def _figure(value: Displayed, drawing: str = "") -> "Figure":
 
 
 def _register(figure: "Figure") -> None:
-    """Let pyplot manage a figure, if it is imported."""
+    """Let pyplot manage a figure, if pyplot is imported."""
     pyplot = sys.modules.get("matplotlib.pyplot")
     if pyplot is not None:
         from matplotlib._pylab_helpers import Gcf

@@ -69,12 +69,13 @@ def require_affordable(task: str, *, memory: float = 0.0, seconds: float = 0.0) 
     if not memory <= limit:
         raise BadInput(
             f"{task} would take about {memory / GIGABYTE:.2g} GB of memory, more than the limit of "
-            f"{limit / GIGABYTE:.2g} GB; reduce it, or set {MEMORY}"
+            f"{limit / GIGABYTE:.2g} GB; reduce it, or raise the limit with the environment "
+            f"variable {MEMORY}"
         )
     if not seconds <= 86400.0 * days:
         raise BadInput(
             f"{task} would take about {seconds / 86400.0:.2g} days, more than the limit of "
-            f"{days:g}; reduce it, or set {DAYS}"
+            f"{days:g} days; reduce it, or raise the limit with the environment variable {DAYS}"
         )
 
 

@@ -280,7 +280,7 @@ class ContactDamping(DampingLaw):
         """
         if solution is None:
             raise BadInput(
-                "damping law contact needs the solved contact; solve the case or use another law"
+                'the damping law "contact" needs a solved contact; solve the case or use another'
             )
         frequency_hz = float(np.sqrt(stiffness / mass) / (2.0 * np.pi))
         contact_ratio = postprocessing.dynamic_stiffness(solution, frequency_hz).damping_ratio

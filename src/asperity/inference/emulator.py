@@ -189,7 +189,7 @@ def build_emulator(
     _require_points(table, len(means.points), len(shares))
     features = emulator_features(setting)
     finer = _finer(setting, sobol, home, run)
-    processes, quality = _processes(means, features(shares[means.points]), home / FITTED, identity)
+    processes, quality = _fitted_gps(means, features(shares[means.points]), home / FITTED, identity)
     return Emulator(
         setting.ranges,
         features,
@@ -331,10 +331,10 @@ def _grid_errors(coarse: pandas.DataFrame, fine: pandas.DataFrame) -> dict[str, 
     return errors
 
 
-def _processes(
+def _fitted_gps(
     means: "_Means", x: Field, fitted: Path, identity: str
 ) -> tuple[dict[str, GaussianProcess], dict[str, EmulatorQuality]]:
-    """Return processes and their quality, loaded, or fitted and stored."""
+    """Load the Gaussian process of each output and its quality, or else fit and store them."""
     processes, quality = {}, {}
     stored = read_json(fitted, REFIT) if fitted.exists() else None
     if stored is not None and stored.get("points", len(x)) != len(x):
@@ -351,7 +351,8 @@ def _processes(
             key: {**processes[key].settings(), "quality": vars(quality[key])} for key in OUTPUTS
         }
         write_json(
-            fitted, {"identity": identity, "layout": LAYOUT, "points": len(x), "outputs": outputs}
+            fitted,
+            {"identity": identity, "layout": LAYOUT, "points": len(x), "outputs": outputs},
         )
     return processes, quality
 

@@ -226,7 +226,7 @@ class BallBearing:
         return np.array([radial, axial, 0.0])
 
     def _stiffnesses(self, shifts: Field, stiffness: float, elastic: float) -> Field:
-        """Return the tangent stiffness, per `elastic` and the larger load, shape (3, 3)."""
+        """Return the tangent stiffness, in larger loads per `approach`, shape (3, 3)."""
         loads, angles = self._balls(elastic * shifts, stiffness)
         slopes = tangent_stiffness(loads, angles, self.angles, stiffness, self.groove_distance)
         return np.asarray(slopes * elastic / max(self.radial_load, self.axial_load))
@@ -405,11 +405,11 @@ class BallBearing:
 
 
 class _Balance(NamedTuple):
-    """Balance of a bearing's balls with both loads, over its free shifts per `elastic`."""
+    """Balance of a bearing's balls with both loads; shifts are in units of `approach` [m]."""
 
     bearing: BallBearing
     stiffness: float
-    elastic: float
+    approach: float  # of one ball under the larger load
 
     @property
     def free(self) -> int:
@@ -426,25 +426,25 @@ class _Balance(NamedTuple):
         """The larger of both loads [N]."""
         return max(self.bearing.radial_load, self.bearing.axial_load)
 
-    def with_tilt(self, shifts: Field) -> Field:
-        """Return all shifts, with an imposed tilt."""
-        tilt = (self.bearing.tilt or 0.0) * self.bearing._arm / self.elastic
-        return np.concatenate([shifts, np.array([0.0, 0.0, tilt])[self.free :]])
+    def with_tilt(self, free_shifts: Field) -> Field:
+        """Return all three shifts: the free ones, and the imposed tilt if there is one."""
+        tilt = (self.bearing.tilt or 0.0) * self.bearing._arm / self.approach
+        return np.concatenate([free_shifts, np.array([0.0, 0.0, tilt])[self.free :]])
 
     def energy(self, shifts: Field) -> float:
-        """Return the potential energy, per `elastic` and the larger load."""
-        loads, _ = self.bearing._balls(self.elastic * self.with_tilt(shifts), self.stiffness)
+        """Return the potential energy, per approach and the larger load."""
+        loads, _ = self.bearing._balls(self.approach * self.with_tilt(shifts), self.stiffness)
         approaches = (loads / self.stiffness) ** (1.0 / EXPONENT)
-        return float(0.4 * loads @ approaches / self.elastic - self.applied @ shifts) / self.force
+        return float(0.4 * loads @ approaches / self.approach - self.applied @ shifts) / self.force
 
     def residual(self, shifts: Field) -> Field:
         """Return the unbalanced forces, per the larger load."""
-        forces = self.bearing._forces(self.elastic * self.with_tilt(shifts), self.stiffness)
+        forces = self.bearing._forces(self.approach * self.with_tilt(shifts), self.stiffness)
         return np.asarray((forces[: self.free] - self.applied) / self.force)
 
     def tangent(self, shifts: Field) -> Field:
         """Return the tangent stiffness of the free shifts."""
         stiffnesses = self.bearing._stiffnesses(
-            self.with_tilt(shifts), self.stiffness, self.elastic
+            self.with_tilt(shifts), self.stiffness, self.approach
         )
         return stiffnesses[: self.free, : self.free]

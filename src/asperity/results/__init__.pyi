@@ -10,6 +10,9 @@ from .dynamic import DynamicCurve as DynamicCurve
 from .fields import FIELD_SUFFIXES as FIELD_SUFFIXES
 from .fields import write_fields as write_fields
 from .friction_interval import FrictionInterval as FrictionInterval
+from .lubrication_regime import BOUNDARY_FROM as BOUNDARY_FROM
+from .lubrication_regime import FULL_FILM_BELOW as FULL_FILM_BELOW
+from .lubrication_regime import lubrication as lubrication
 from .roughness_levels import levels_verdict as levels_verdict
 from .roughness_levels import not_converged as not_converged
 from .run import ENDS as ENDS
@@ -26,10 +29,7 @@ from .surface_spread import Scalar as Scalar
 from .surface_spread import mean_row as mean_row
 from .surface_spread import prediction_interval as prediction_interval
 from .surface_spread import total_error as total_error
-from .uncertainty_text import BOUNDARY_FROM as BOUNDARY_FROM
-from .uncertainty_text import FULL_FILM_BELOW as FULL_FILM_BELOW
 from .uncertainty_text import UNDETERMINED as UNDETERMINED
-from .uncertainty_text import lubrication as lubrication
 from .uncertainty_text import uncertainty_rows as uncertainty_rows
 from .vibration import VibratedCase as VibratedCase
 from .vibration import vibrate_case as vibrate_case

@@ -24,10 +24,11 @@ from asperity.results.friction_interval import (
     friction_interval,
     numerical_error,
 )
+from asperity.results.lubrication_regime import lubrication
 from asperity.results.run_contents import run_contents
 from asperity.results.running import Running
 from asperity.results.surface_spread import AVERAGED, Row, Scalar, half_interval, mean_row
-from asperity.results.uncertainty_text import basis, ends_text, interval_text, lubrication
+from asperity.results.uncertainty_text import basis, ends_text, interval_text
 from asperity.solution import (
     FILMS,
     HOT,

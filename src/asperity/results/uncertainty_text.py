@@ -13,22 +13,11 @@ PARTS = {  # part of an uncertainty: name in tables
     "record": "record length",
 }
 UNDETERMINED = "not determined"
-FULL_FILM_BELOW = 0.01  # share of the load on asperities
-BOUNDARY_FROM = 0.9
 REASONS = {  # reason why a part is not determined
     "iteration": "no solution to compare with",
     "grid": "no coarser grid to compare with",
     "record": "not given by the method",
 }
-
-
-def lubrication(clr: float, *, lubricated: bool) -> str:
-    """Return full film, mixed or boundary lubrication by the load share, or dry contact."""
-    if not lubricated:
-        return "Dry contact"
-    if clr < FULL_FILM_BELOW:
-        return "Full film"
-    return "Boundary lubrication" if clr >= BOUNDARY_FROM else "Mixed lubrication"
 
 
 def interval_text(key: str, error: Uncertainty) -> str:

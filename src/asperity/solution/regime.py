@@ -1,6 +1,7 @@
 """Regime card: lubrication regime of a solved contact, compared with published film formulas.
 
-The regime is decided in `ehl.film_formulas`; full, mixed or boundary lubrication in `results.run`.
+`ehl.film_formulas` decides the regime; `results.lubrication_regime` decides full film, mixed or
+boundary lubrication, by CLR.
 """
 
 import math

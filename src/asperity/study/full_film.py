@@ -7,14 +7,15 @@ that was not found although asperities carry load stays unknown.
 import numpy as np
 import pandas
 
-FULL_FILM_CLR = 0.01  # CLR below which the film counts as full; lower end of the search band
+from asperity.results import FULL_FILM_BELOW
+
 CRF_COLUMNS = ("crf_hz", "crf_sound_hz", "crf_paper_hz")
 CRFA_COLUMNS = ("crfa", "crfa_sound", "crfa_paper")
 
 
 def is_full_film(table: pandas.DataFrame) -> "pandas.Series[bool]":
     """Return True for contacts in full film: CLR too low, or no contact in the Hertz zone."""
-    return (table["clr"] < FULL_FILM_CLR) | (table["car"] == 0.0)
+    return (table["clr"] < FULL_FILM_BELOW) | (table["car"] == 0.0)
 
 
 def with_full_film_limits(table: pandas.DataFrame) -> pandas.DataFrame:
@@ -22,7 +23,7 @@ def with_full_film_limits(table: pandas.DataFrame) -> pandas.DataFrame:
     if "full_load_crf_hz" not in table:
         return table
     full = is_full_film(table)
-    lowest = table["full_load_crf_hz"] * np.maximum(table["clr"], FULL_FILM_CLR) ** (1.0 / 6.0)
+    lowest = table["full_load_crf_hz"] * np.maximum(table["clr"], FULL_FILM_BELOW) ** (1.0 / 6.0)
     limits = {**dict.fromkeys(CRF_COLUMNS, lowest), **dict.fromkeys(CRFA_COLUMNS, 0.0)}
     present = {name: table[name].astype(float) for name in limits if name in table}
     return table.assign(

@@ -54,7 +54,8 @@ def read_maps(folder: Path, study: str, case_id: str) -> dict[str, Field]:
         raise UnreadableFile(f"{path} contains a link, which is not followed; {REMEDY}")
     if not path.is_dir():
         raise UnreadableFile(
-            f"{folder} has no maps of case {case_id}; request them with --fields when computing it"
+            f"{folder} has no maps of case {case_id}; run the study with --fields in a new folder, "
+            "because finished cases are not computed again"
         )
     maps: dict[str, Field] = read_in_subprocess(
         path.absolute(), f"{__name__}:unpack_maps", study, case_id, remedy=REMEDY

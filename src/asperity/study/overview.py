@@ -106,7 +106,7 @@ class StudyOverview:
 
     @cached_property
     def outputs(self) -> list[str]:
-        """Columns of the table to show."""
+        """Keys of the outputs that vary over the converged cases."""
         return varying_outputs(self.used)
 
     def verdict(self) -> str:

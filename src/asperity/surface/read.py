@@ -325,8 +325,9 @@ def _table(path: Path) -> RawMap:
         return map_of_points(path.name, numbers)
     if min(numbers.shape) < MIN_CELLS:
         raise UnreadableFile(
-            f"{path.name} holds {numbers.shape[0]} rows of {numbers.shape[1]} numbers; "
-            "give a profile (x, z), points (x, y, z) or a matrix of heights"
+            f"{path.name} has {numbers.shape[0]} x {numbers.shape[1]} numbers, too few for a "
+            f"surface; give a profile (x, z), at least {MIN_CELLS**2} points (x, y, z), or at "
+            f"least {MIN_CELLS} x {MIN_CELLS} heights"
         )
     return map_of_rows(numbers, "text")
 

@@ -40,7 +40,7 @@ from asperity.trend.stage_words import (
 
 Detector = Literal["bayesian"]
 
-SEVERE_FROM = 0.5  # probability
+SEVERE_FROM = 0.5  # probability of lying beyond the break, if there is one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,8 +75,8 @@ class Stages(Brief):
     probability : shape (recordings,), of being in the severe stage; 0 for running-in and
         steepening, nan where not determined. Weighs the broken stick against smooth curves, so it
         stays below 1 where no stage is distinct
-    labels : "normal", "severe" (probability 0.5 or more), "steady", "steepening", "running-in" or
-        "none", one per recording
+    labels : "normal", "severe" (probably beyond the break, if there is one), "steady",
+        "steepening", "running-in" or "none", one per recording
     evidence : BIC of each model relative to the best; 0 is the best, 6 or more is strong evidence
         against
     slopes : of CRF before and after the break [Hz per unit of x]; nan without CRF

@@ -212,10 +212,10 @@ def drag_length(passage: Passage) -> float:
 
 
 def loaded_columns(passage: Passage) -> slice:
-    """Return the cells across rolling that carry load: all of a line contact.
+    """Return the slice of cells across rolling that carry load; all cells of a line contact.
 
-    The pressure of a solved point contact is slightly above 0 on all of its domain, so columns
-    below LOADED_SHARE of the largest load are left out.
+    The pressure of a solved point contact is slightly positive everywhere, so columns that carry
+    less than LOADED_SHARE of the largest column load are left out.
     """
     if passage.grid.periodic[1]:
         return slice(0, passage.grid.cells[1])

@@ -95,9 +95,10 @@ def find_scar(measured: MeasuredSurface) -> Scar:
         or width > 0.5 * (x[-1] - x[0])
     ):
         raise BadInput(
-            f"{measured.name} shows a track of {length_text(width)} in "
-            f"{length_text(x[-1] - x[0])}; measure at least {MIN_POINTS} points across the track "
-            "and its own width beside it"
+            f"{measured.name} has a track {length_text(width)} wide in a profile "
+            f"{length_text(x[-1] - x[0])} long; measure a profile at least twice as long as the "
+            f"track is wide, with at least {MIN_POINTS} points across the track and "
+            f"{2 * MIN_POINTS} outside it"
         )
     areas = tuple(
         _areas(x, z, edges, ROUGHNESS_LEVEL * roughness, *variant)

@@ -103,7 +103,7 @@ class PageSite:
         view = contact.ContactView(
             Settings(self.opened.case, preset=self.opened.preset),
             self._visit_pool(),
-            _deliver(),
+            _callback_scheduler(),
             _address(),
             self.tools,
             self.surfaces,
@@ -124,7 +124,7 @@ class PageSite:
         context = RecordingContext(
             self.opened.case if self.opened.stated else None, self.opened.table
         )
-        view = recordings.RecordingsView(folder, context, self._visit_pool(), _deliver())
+        view = recordings.RecordingsView(folder, context, self._visit_pool(), _callback_scheduler())
         panel.state.on_session_destroyed(lambda _context: view.close())
         if folder is not None:
             _document().add_periodic_callback(view.refresh, FOLDER_CHECK_MS)
@@ -135,7 +135,9 @@ class PageSite:
         """Create the page of a study for one visit."""
         assert self.opened.path is not None
         assert isinstance(self.opened.case, Case)
-        view = study.StudyView(self.opened.path, self.opened.case, self._visit_pool(), _deliver())
+        view = study.StudyView(
+            self.opened.path, self.opened.case, self._visit_pool(), _callback_scheduler()
+        )
         panel.state.on_session_destroyed(lambda _context: view.close())
         view.begin()
         return self._page("study", "Study", *study.layout(view))
@@ -143,7 +145,7 @@ class PageSite:
     def history(self) -> Any:
         """Create the page of a history for one visit."""
         assert self.opened.path is not None
-        view = history.HistoryView(self.opened.path, self._visit_pool(), _deliver())
+        view = history.HistoryView(self.opened.path, self._visit_pool(), _callback_scheduler())
         panel.state.on_session_destroyed(lambda _context: view.close())
         _document().add_periodic_callback(view.advance, FRAME_MS)
         view.begin()
@@ -239,11 +241,11 @@ def _limit_logging() -> None:
         logging.getLogger(name).setLevel(logging.ERROR)
 
 
-def _deliver() -> Callable[[Callable[[], None]], None]:
-    """Return a function that runs others under the lock of the current document, thread-safe.
+def _callback_scheduler() -> Callable[[Callable[[], None]], None]:
+    """Return a thread-safe function that schedules callbacks under the current document's lock.
 
-    A callback that another thread adds to a document is lost while Bokeh holds its events back,
-    so that only the server's own thread adds them.
+    Bokeh loses a callback that another thread adds while it holds events back; callbacks are
+    therefore added only by the server's thread.
     """
     document, loop = _document(), IOLoop.current()
 

@@ -57,7 +57,7 @@ def oil_of(step: Step, surface: Surface, scales: Scales) -> Oil:
 
 
 def unknowns_of(step: Step) -> Pressures:
-    """Return the unknowns of a step."""
+    """Return oil pressure, total pressure and approach of a Newton step of the mixed model."""
     assert isinstance(step.balance, MixedBalance)
     return step.balance.unknowns
 
