@@ -205,7 +205,7 @@ def test_results_of_jobs_reach_the_document_in_the_thread_of_the_server(monkeypa
     monkeypatch.setattr(server, "_document", lambda: document)
 
     async def visit():
-        deliver, done = server._deliver(), asyncio.Event()
+        deliver, done = server._callback_scheduler(), asyncio.Event()
         await asyncio.to_thread(deliver, done.set)
         await asyncio.wait_for(done.wait(), 10.0)
 
