@@ -1,6 +1,14 @@
 from .cases import BenchmarkCase as BenchmarkCase
 from .cases import Certified as Certified
 from .cases import load_benchmark as load_benchmark
+from .experiments import ComparedPoint as ComparedPoint
+from .experiments import Comparison as Comparison
+from .experiments import Experiment as Experiment
+from .experiments import ExperimentResult as ExperimentResult
+from .experiments import MeasuredPoint as MeasuredPoint
+from .experiments import compare_experiments as compare_experiments
+from .experiments import compare_with as compare_with
+from .experiments import load_experiments as load_experiments
 from .run import BenchmarkResult as BenchmarkResult
 from .run import BenchmarkRow as BenchmarkRow
 from .run import run_benchmark as run_benchmark

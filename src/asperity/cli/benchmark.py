@@ -1,5 +1,6 @@
-"""`asperity benchmark`: compare a solver with certified values."""
+"""`asperity benchmark`: compare a solver with certified values, and asperity with measurements."""
 
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,9 +11,17 @@ from asperity import report
 from asperity.cli.app import app
 from asperity.cli.options import AsJson, OutFiles, Quiet, require_output
 from asperity.cli.output import Block, columns, progress, show, written
+from asperity.core.errors import BadInput
 
 if TYPE_CHECKING:
-    from asperity.benchmark import BenchmarkResult
+    from asperity.benchmark import BenchmarkResult, ExperimentResult
+
+
+class Against(StrEnum):
+    """Values that a solver is compared with."""
+
+    CERTIFIED = "certified"
+    EXPERIMENT = "experiment"
 
 
 @app.command()
@@ -31,13 +40,24 @@ def benchmark(
         Path | None,
         typer.Option(metavar="DIR", help="Folder of cases (default: those of asperity)."),
     ] = None,
+    against: Annotated[
+        Against,
+        typer.Option(help="Values to compare with; `experiment`: measured films and resonances."),
+    ] = Against.CERTIFIED,
     out: OutFiles = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Compare a solver with contacts of certified values."""
+    """Compare a solver with certified or measured values."""
     for path in out or ():
         require_output(path, ".csv", ".png", ".pdf")
+    if against is Against.EXPERIMENT:
+        if cells or solver != "asperity":
+            raise BadInput(
+                "--against experiment compares asperity alone; leave out --solver and --cells"
+            )
+        _compare_with_experiments(cases, out or [], as_json=as_json, quiet=quiet)
+        return
     chosen = certified.solver_named(solver)
     with progress(
         "benchmark", "solving ...", quiet=quiet, compiles=solver == "asperity"
@@ -60,6 +80,51 @@ def benchmark(
         as_json=as_json,
         quiet=quiet,
     )
+
+
+def _compare_with_experiments(
+    folder: Path | None, out: list[Path], *, as_json: bool, quiet: bool
+) -> None:
+    with progress("benchmark", "solving ...", quiet=quiet, compiles=True) as display:
+        result = certified.compare_experiments(folder=folder, progress=display)
+    saved = [
+        result.save(path)
+        if path.suffix.lower() == ".csv"
+        else report.write_figure(report.experiment_figure(result), path)
+        for path in out
+    ]
+    show(
+        result.verdict(),
+        lambda: result.scalars() | {"written": [str(path) for path in saved]},
+        _set_rows(result),
+        written("Written", *saved) if saved else [],
+        as_json=as_json,
+        quiet=quiet,
+    )
+
+
+def _set_rows(result: "ExperimentResult") -> Block:
+    """Return a row per set of measurements."""
+    rows = [
+        [
+            entry.experiment.title,
+            str(len(entry.points)),
+            f"{entry.mean:.3f}" if entry.fitted_viscosity is None else "1, fitted",
+            f"{100.0 * entry.scatter:.1f}",
+            f"{100.0 * entry.heated_scatter:.1f}",
+            "" if entry.inside is None else f"{entry.inside} of {len(entry.points)}",
+        ]
+        for entry in result.comparisons
+    ]
+    heads = [
+        "measurements",
+        "points",
+        "mean ratio",
+        "scatter [%]",
+        "with inlet heat [%]",
+        "in the interval",
+    ]
+    yield from columns(heads, rows, left=1)
 
 
 def _rows(result: "BenchmarkResult") -> Block:

@@ -13,6 +13,7 @@ from .film_formulas import FilmNumbers as FilmNumbers
 from .film_formulas import Regime as Regime
 from .film_formulas import film_fits as film_fits
 from .film_formulas import film_numbers as film_numbers
+from .film_formulas import inlet_heating_factor as inlet_heating_factor
 from .film_formulas import least_film as least_film
 from .film_formulas import lubrication_regime as lubrication_regime
 from .grid_design import ACCURACY as ACCURACY

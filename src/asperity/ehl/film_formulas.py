@@ -12,7 +12,7 @@ import numpy as np
 
 from asperity.contact.conditions import ContactConditions
 from asperity.core.errors import BadInput, require_positive
-from asperity.lubricant import Lubricant
+from asperity.lubricant import Lubricant, Thermal
 
 Regime = Literal[
     "isoviscous-rigid", "isoviscous-elastic", "piezoviscous-rigid", "piezoviscous-elastic"
@@ -270,3 +270,35 @@ def _nijenbanning(films: _Asymptotes, ratio: float) -> float:
     s = 1.5 * (1.0 + np.exp(-1.2 * elastic / stiff))
     thick = (stiff_rigid**-8.0 + stiff**-8.0) ** (-s / 8.0)
     return float((thin ** (2.0 * s / 3.0) + thick) ** (1.0 / s))
+
+
+def inlet_heating_factor(
+    conditions: ContactConditions, lubricant: Lubricant, thermal: Thermal
+) -> float:
+    """Return the film with heat of shear in the inlet over the isothermal film, by a fit.
+
+    φ = (1 - 13.2 (p_h/E') L^0.42)/(1 + 0.213 (1 + 2.23 S^0.83) L^0.64) with the thermal loading
+    parameter L = η₀ β u²/k and the slide-to-roll ratio S. β = -d(ln η)/dT at the oil's temperature.
+    Source: P. K. Gupta, H. S. Cheng, D. Zhu, N. H. Forster, J. B. Schrand, Tribol. Trans. 35 (1992)
+    269.
+
+    Examples
+    --------
+    >>> from asperity.case import case_template, load_case
+    >>> from asperity.ehl import inlet_heating_factor
+    >>> case = load_case(case_template("point"))
+    >>> f"{inlet_heating_factor(case.conditions, case.lubricant, case.thermal):.3f}"
+    '0.984'
+    """
+    eta0 = np.array([lubricant.viscosity.eta0])
+    step = 0.01  # [K], each way
+    warm, cold = (
+        float(thermal.warmth.factor(eta0, np.array([thermal.ambient + rise]), thermal.ambient)[0])
+        for rise in (step, -step)
+    )
+    slope = float(np.log(cold / warm)) / (2.0 * step)
+    speed = conditions.entrainment_speed
+    loading = lubricant.viscosity.eta0 * slope * speed**2 / thermal.oil_conductivity
+    pressure = conditions.hertz.p_max / conditions.pair.effective_modulus
+    sliding = 1.0 + 2.23 * abs(conditions.slide_to_roll) ** 0.83
+    return float((1.0 - 13.2 * pressure * loading**0.42) / (1.0 + 0.213 * sliding * loading**0.64))

@@ -1,10 +1,13 @@
-"""Figure of a benchmark: error of each certified value over computing time."""
+"""Figures of a benchmark: error of each certified value over computing time; measurements."""
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
-from asperity.benchmark import BenchmarkResult
+from asperity.benchmark import BenchmarkResult, Comparison, ExperimentResult
+from asperity.core.quantities import quantity
 from asperity.report.style import BLUE, GREEN, GREY, ON_PAGE, SPLIT_COLOUR, VERMILION
 
 FAMILIES = (
@@ -34,8 +37,8 @@ def benchmark_figure(*results: BenchmarkResult) -> Figure:
 
 def _panel(axes: Axes, result: BenchmarkResult) -> None:
     labelled: set[str] = set()
-    for case, quantity in dict.fromkeys((row.case, row.quantity) for row in result.rows):
-        rows = [row for row in result.rows if (row.case, row.quantity) == (case, quantity)]
+    for case, key in dict.fromkeys((row.case, row.quantity) for row in result.rows):
+        rows = [row for row in result.rows if (row.case, row.quantity) == (case, key)]
         family = case.partition("-")[0]
         colour, marker = next(((c, m) for name, c, m in FAMILIES if name == family), (GREY, "D"))
         axes.loglog(
@@ -55,3 +58,65 @@ def _panel(axes: Axes, result: BenchmarkResult) -> None:
     axes.set_title(f"{result.solver}: error over computing time, {cells} cells")
     if labelled:
         axes.legend(ncols=2)
+
+
+@ON_PAGE.drawing()
+def experiment_figure(result: ExperimentResult) -> Figure:
+    """Draw measured and computed values, and their ratio, over the varied value; a row per set."""
+    shown = [entry for entry in result.comparisons if len(entry.points) > 1]
+    figure = Figure(figsize=(ON_PAGE.double, 2.6 * len(shown)), layout="constrained")
+    rows = figure.subplots(len(shown), 2, squeeze=False, sharex="row")
+    for (values, ratios), entry in zip(rows, shown, strict=True):
+        _values_panel(values, entry)
+        _ratio_panel(ratios, entry)
+    return figure
+
+
+def _values_panel(axes: Axes, entry: Comparison) -> None:
+    """Draw measured values with the deviation of repeats, and computed ones with their limits."""
+    kind = quantity(entry.experiment.key)
+    x = [point.swept for point in entry.points]
+    measured, computed = (
+        [getattr(point, name) * kind.factor for point in entry.points]
+        for name in ("measured", "computed")
+    )
+    axes.loglog(x, computed, color=BLUE, label="computed")
+    if entry.inside is not None:
+        low, high = (
+            [getattr(point, name) * kind.factor for point in entry.points]
+            for name in ("low", "high")
+        )
+        axes.fill_between(x, low, high, color=BLUE, alpha=0.2, linewidth=0)
+    deviations = [(point.deviation or 0.0) * kind.factor for point in entry.points]
+    axes.errorbar(x, measured, deviations, fmt="o", color=VERMILION, markersize=3, label="measured")
+    axes.set_ylabel(kind.label)
+    _set_plain_ticks(axes.yaxis)
+    axes.set_title(entry.experiment.title)
+    axes.legend()
+    _label_swept(axes, entry)
+
+
+def _ratio_panel(axes: Axes, entry: Comparison) -> None:
+    x = [point.swept for point in entry.points]
+    axes.semilogx(x, [point.ratio for point in entry.points], "o-", color=BLUE, markersize=3)
+    heated = [point.heated_ratio for point in entry.points]
+    axes.semilogx(x, heated, ":", color=GREEN, label="with factor for heat in the inlet")
+    axes.legend()
+    axes.axhline(1.0, color=GREY, linewidth=0.8)
+    axes.set_ylabel("computed / measured")
+    fitted = ", viscosity fitted" if entry.fitted_viscosity is not None else ""
+    axes.set_title(f"mean {entry.mean:.3f}, scatter {100.0 * entry.scatter:.1f} %{fitted}")
+    _label_swept(axes, entry)
+
+
+def _label_swept(axes: Axes, entry: Comparison) -> None:
+    key, _, unit = entry.experiment.swept.partition(" ")
+    _set_plain_ticks(axes.xaxis)
+    axes.set_xlabel(f"{key.rpartition('.')[2].replace('_', ' ')} {unit}")
+
+
+def _set_plain_ticks(axis: Axis) -> None:
+    """Label 1, 2 and 5 of every decade as plain numbers."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FormatStrFormatter("%g"))
+    axis.set_minor_formatter(NullFormatter())

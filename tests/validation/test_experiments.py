@@ -1,0 +1,124 @@
+"""asperity against experiment: mean and scatter of computed over measured values, as documented."""
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from asperity.benchmark import compare_with, load_experiments
+from asperity.cli import main
+from asperity.contact.conditions import ContactConditions, ElasticPair
+from asperity.core.errors import BadInput
+from asperity.ehl import inlet_heating_factor
+from asperity.lubricant import (
+    DowsonHigginson,
+    ExponentialWarmth,
+    Lubricant,
+    Newtonian,
+    Roelands,
+    Thermal,
+)
+
+PAGE = Path(__file__).parents[2] / "docs" / "measured" / "experiment.md"
+SETS = {experiment.name: experiment for experiment in load_experiments()}
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_computed_values_agree_as_documented(name):
+    experiment = SETS[name]
+    comparison = compare_with(experiment)
+    assert comparison.mean == pytest.approx(experiment.mean, abs=0.004)
+    assert comparison.scatter == pytest.approx(experiment.scatter, abs=0.003)
+    assert comparison.heated_scatter == pytest.approx(experiment.heated_scatter, abs=0.003)
+    assert (comparison.fitted_viscosity is None) is not experiment.fits_viscosity
+    if name == "fva3-25c":
+        assert comparison.inside == 17
+        assert experiment.heated_scatter <= 0.025
+        widths = [(p.high - p.low) / p.computed for p in comparison.points]
+        assert 0.15 < np.median(widths) < 0.25  # alpha to 20 %, and film ~ alpha^0.5
+
+
+def test_the_page_states_every_set():
+    rows = re.findall(
+        r"^\| (.+?) \| (\d+) \| [\w ]+ \| ([\d.]+) \| ([\d.]*(?: %)?) ?\|",
+        PAGE.read_text("utf-8"),
+        re.M,
+    )
+    assert len(rows) == len(SETS)
+    stated = sorted((int(count), float(mean), scatter) for _, count, mean, scatter in rows)
+    expected = sorted(
+        (
+            len(experiment.points),
+            experiment.mean,
+            f"{100.0 * experiment.scatter:.1f} %" if len(experiment.points) > 1 else "",
+        )
+        for experiment in SETS.values()
+    )
+    assert stated == expected
+    text = PAGE.read_text("utf-8")
+    for experiment in SETS.values():
+        first = experiment.source.split(" (")[0].split(";")[0]
+        assert first.removeprefix("github.com/").split(",")[0] in text
+
+
+def test_a_change_of_the_film_by_a_percent_is_detected():
+    """The tolerances see a film that is thicker by 1 %, or a fitted viscosity by 2 %."""
+    comparison = compare_with(replace(SETS["fva3-25c"], points=SETS["fva3-25c"].points[:3]))
+    moved = [replace(point, computed=1.01 * point.computed) for point in comparison.points]
+    assert abs(replace(comparison, points=tuple(moved)).mean - comparison.mean) > 0.004
+
+
+def test_the_factor_for_inlet_heat():
+    """Values worked out by hand from Gupta et al. (1992); no heat at rest, more with sliding."""
+    oil = Lubricant(
+        viscosity=Roelands(0.1, 20e-9), density=DowsonHigginson(870.0), rheology=Newtonian()
+    )
+    thermal = Thermal(warmth=ExponentialWarmth(0.05), oil_conductivity=0.125)
+
+    def factor(speed, slip=0.0):
+        conditions = ContactConditions(
+            pair=ElasticPair((206e9, 206e9), (0.3, 0.3)),
+            geometry="point",
+            radius=0.01,
+            load=20.0,
+            surface_speeds=(speed * (1.0 + slip / 2.0), speed * (1.0 - slip / 2.0)),
+        )
+        ratio = conditions.hertz.p_max / conditions.pair.effective_modulus
+        return inlet_heating_factor(conditions, oil, thermal), ratio
+
+    found, ratio = factor(5.0)  # L = 0.1 * 0.05 * 25 / 0.125 = 1
+    assert found == pytest.approx((1.0 - 13.2 * ratio) / 1.213, rel=1e-5)
+    sliding, _ = factor(5.0, slip=1.0)
+    assert sliding == pytest.approx((1.0 - 13.2 * ratio) / (1.0 + 0.213 * 3.23), rel=1e-5)
+    assert factor(1e-4)[0] == pytest.approx(1.0, abs=1e-3)
+    speeds = [factor(speed)[0] for speed in (0.1, 0.5, 1.0, 3.0)]
+    assert speeds == sorted(speeds, reverse=True)
+
+
+def test_the_command_compares_a_folder(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    source = Path(__file__).parents[2] / "benchmark" / "experiments"
+    Path("sets").mkdir()
+    text = (source / "fva3-25c.toml").read_text("utf-8")
+    head, _, points = text.partition("points = [\n")
+    few = head + "points = [\n" + "".join(points.splitlines(keepends=True)[:2]) + "]\n"
+    Path("sets", "few.toml").write_text(few, "utf-8")
+    arguments = ["benchmark", "--against", "experiment", "--cases", "sets", "--out", "a.csv"]
+    with pytest.raises(SystemExit):
+        main([*arguments, "--out", "a.png", "--json"])
+    result = json.loads(capsys.readouterr().out)
+    assert result["sets"][0]["points"] == 2
+    assert result["rows"][0]["ratio"] == pytest.approx(1.02, abs=0.02)
+    assert [Path(name).exists() for name in result["written"]] == [True, True]
+    with pytest.raises(SystemExit) as end:
+        main([*arguments, "--solver", "tamaas"])
+    assert end.value.code == 2
+    assert "compares asperity alone" in capsys.readouterr().err
+    Path("sets", "few.toml").write_text(few.replace("measured [nm]", "measured [um]"), "utf-8")
+    with pytest.raises(BadInput, match=r"few\.toml is not a set of measurements"):
+        load_experiments(Path("sets"))
+    with pytest.raises(BadInput, match="contains no measurements"):
+        load_experiments(tmp_path)
