@@ -34,6 +34,7 @@ def test_computed_values_agree_as_documented(name):
     assert comparison.scatter == pytest.approx(experiment.scatter, abs=0.003)
     assert comparison.heated_scatter == pytest.approx(experiment.heated_scatter, abs=0.003)
     assert (comparison.fitted_viscosity is None) is not experiment.fits_viscosity
+    assert (comparison.inside is not None) is name.startswith("fva3")
     if name == "fva3-25c":
         assert comparison.inside == 17
         assert experiment.heated_scatter <= 0.025

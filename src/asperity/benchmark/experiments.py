@@ -81,8 +81,8 @@ class ComparedPoint:
     """Measured and computed value [SI], and the limits of the computed one.
 
     The limits contain the discretisation error and the interval of an estimated pressure-viscosity
-    coefficient; None where something was fitted. `inlet_heating` is the published factor for heat
-    of shear in the inlet, which the solution does not contain.
+    coefficient; None where the viscosity was fitted, and for dry contacts. `inlet_heating` is the
+    published factor for heat of shear in the inlet, which the solution does not contain.
     """
 
     experiment: str
@@ -331,11 +331,14 @@ def _compute(experiment: Experiment, case: Case) -> tuple[ComparedPoint, ...]:
     return tuple(points)
 
 
-def _alpha_effect(experiment: Experiment, case: Case) -> tuple[float, float]:
-    """Return the relative effect of the ends of alpha's interval, at the middle point."""
+def _alpha_effect(experiment: Experiment, case: Case) -> tuple[float, float] | None:
+    """Return the relative effect of the ends of alpha's interval at the middle point.
+
+    None for a dry contact, whose interval would be that of the assumed modulus.
+    """
     middle = case.with_overrides(experiment.points[len(experiment.points) // 2].conditions)
     if middle.lubricant is None:
-        return 0.0, 0.0
+        return None
     alpha, error = (
         float(middle.lubricant.viscosity.log_slope(np.zeros(1))[0]),
         middle.lubricant.alpha_error,
