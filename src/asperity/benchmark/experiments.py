@@ -17,7 +17,7 @@ import numpy as np
 
 from asperity.case import Case, load_case
 from asperity.core import files
-from asperity.core.errors import BadInput
+from asperity.core.errors import AsperityError, BadInput
 from asperity.core.quantities import quantity
 from asperity.ehl import inlet_heating_factor
 from asperity.results import solve_case
@@ -55,8 +55,8 @@ class Experiment:
     missed : where computation and measurement differ, in words; may be empty
     key : key of the measured quantity in the catalogue
     swept : name and unit of the value that varies from point to point
-    mean, scatter, heated_scatter : of computed over measured, the last with the factor for heat of
-        shear in the inlet, as documented; the tests hold the solver to them
+    mean, scatter, heated_scatter : of computed over measured, the last with the factor for inlet
+        shear heating, as documented; the tests hold the solver to them
     """
 
     name: str
@@ -82,7 +82,7 @@ class ComparedPoint:
 
     The limits contain the discretisation error and the interval of an estimated pressure-viscosity
     coefficient; None where the viscosity was fitted, and for dry contacts. `inlet_heating` is the
-    published factor for heat of shear in the inlet, which the solution does not contain.
+    published factor for inlet shear heating, which the solution does not contain.
     """
 
     experiment: str
@@ -136,12 +136,20 @@ class Comparison:
         return float(np.std(ratios))
 
     @property
-    def inside(self) -> int | None:
-        """Number of measured values between the limits; None if there are no limits."""
-        limits = [(point.low, point.measured, point.high) for point in self.points]
-        if any(low is None or high is None for low, _, high in limits):
+    def mean_interval(self) -> tuple[float, float] | None:
+        """90 % interval of `mean` from the limits of the computed values; None without limits.
+
+        Those of all points move together, because they have one pressure-viscosity coefficient.
+        """
+        ends = [
+            (point.low / point.measured, point.high / point.measured)
+            for point in self.points
+            if point.low is not None and point.high is not None
+        ]
+        if len(ends) < len(self.points):
             return None
-        return sum(low <= value <= high for low, value, high in limits if low and high)
+        low, high = np.mean(ends, axis=0)
+        return float(low), float(high)
 
 
 @dataclass(frozen=True)
@@ -151,16 +159,16 @@ class ExperimentResult:
     comparisons: tuple[Comparison, ...]
 
     def verdict(self) -> str:
-        """Return one sentence: sets, points, and deviations where nothing was fitted."""
-        blind = [entry for entry in self.comparisons if entry.fitted_viscosity is None]
+        """Return one sentence: sets, points, and deviations where the viscosity is known."""
+        known = [entry for entry in self.comparisons if entry.mean_interval is not None]
         points = sum(len(comparison.points) for comparison in self.comparisons)
-        ratios = [point.ratio for comparison in blind for point in comparison.points]
+        ratios = [point.ratio for comparison in known for point in comparison.points]
         worst = max(self.comparisons, key=lambda comparison: comparison.scatter)
         return (
-            f"{points} measured values in {len(self.comparisons)} sets: where nothing was fitted, "
-            f"computed over measured is {np.mean(ratios):.2f} in the mean ({min(ratios):.2f} to "
-            f"{max(ratios):.2f}); the largest scatter of a set is {100.0 * worst.scatter:.1f} % "
-            f"({worst.experiment.title})."
+            f"{points} measured values in {len(self.comparisons)} sets: where the viscosity is "
+            f"known, computed over measured is {np.mean(ratios):.2f} in the mean "
+            f"({min(ratios):.2f} to {max(ratios):.2f}); the largest scatter of a set is "
+            f"{100.0 * worst.scatter:.1f} % ({worst.experiment.title})."
         )
 
     def rows(self) -> list[dict[str, object]]:
@@ -186,7 +194,7 @@ class ExperimentResult:
                 "scatter": comparison.scatter,
                 "heated_mean_ratio": comparison.heated_mean,
                 "heated_scatter": comparison.heated_scatter,
-                "inside": comparison.inside,
+                "mean_interval": comparison.mean_interval,
                 "missed": comparison.experiment.missed,
             }
             for comparison in self.comparisons
@@ -294,9 +302,12 @@ def compare_with(experiment: Experiment) -> Comparison:
         case = experiment.case.with_overrides({VISCOSITY: viscosity})
         comparison = Comparison(experiment, _compute(experiment, case), viscosity)
         if abs(comparison.mean - 1.0) < FIT_TOLERANCE:
-            break
+            return comparison
         viscosity *= comparison.mean ** (-1.0 / FIT_POWER)
-    return comparison
+    raise AsperityError(
+        f"{experiment.name}: the fit of the viscosity did not converge in {MAX_FITS} rounds; state "
+        f"{VISCOSITY} closer to {1e6 * viscosity:.3g} mm^2/s"
+    )
 
 
 def _compute(experiment: Experiment, case: Case) -> tuple[ComparedPoint, ...]:

@@ -275,7 +275,7 @@ def _nijenbanning(films: _Asymptotes, ratio: float) -> float:
 def inlet_heating_factor(
     conditions: ContactConditions, lubricant: Lubricant, thermal: Thermal
 ) -> float:
-    """Return the film with heat of shear in the inlet over the isothermal film, by a fit.
+    """Return the film with inlet shear heating over the isothermal film, by a fit; 1 at rest.
 
     φ = (1 - 13.2 (p_h/E') L^0.42)/(1 + 0.213 (1 + 2.23 S^0.83) L^0.64) with the thermal loading
     parameter L = η₀ β u²/k and the slide-to-roll ratio S. β = -d(ln η)/dT at the oil's temperature.
@@ -298,6 +298,8 @@ def inlet_heating_factor(
     )
     slope = float(np.log(cold / warm)) / (2.0 * step)
     speed = conditions.entrainment_speed
+    if speed == 0.0:
+        return 1.0
     loading = lubricant.viscosity.eta0 * slope * speed**2 / thermal.oil_conductivity
     pressure = conditions.hertz.p_max / conditions.pair.effective_modulus
     sliding = 1.0 + 2.23 * abs(conditions.slide_to_roll) ** 0.83

@@ -81,7 +81,7 @@ def _values_panel(axes: Axes, entry: Comparison) -> None:
         for name in ("measured", "computed")
     )
     axes.loglog(x, computed, color=BLUE, label="computed")
-    if entry.inside is not None:
+    if entry.mean_interval is not None:
         low, high = (
             [getattr(point, name) * kind.factor for point in entry.points]
             for name in ("low", "high")
@@ -100,7 +100,7 @@ def _ratio_panel(axes: Axes, entry: Comparison) -> None:
     x = [point.swept for point in entry.points]
     axes.semilogx(x, [point.ratio for point in entry.points], "o-", color=BLUE, markersize=3)
     heated = [point.heated_ratio for point in entry.points]
-    axes.semilogx(x, heated, ":", color=GREEN, label="with factor for heat in the inlet")
+    axes.semilogx(x, heated, ":", color=GREEN, label="with factor for inlet shear heating")
     axes.legend()
     axes.axhline(1.0, color=GREY, linewidth=0.8)
     axes.set_ylabel("computed / measured")
