@@ -13,7 +13,7 @@ from asperity.cli.contact import CONVERGENCE, run_table
 from asperity.core.quantities import NO_VALUE, catalogue, quantity
 from asperity.coupling import contact_vibration
 from asperity.report import write_report
-from asperity.results import SHORT_GROUPS
+from asperity.results import SHORT_GROUPS, lubrication
 from asperity.solution import OwnResonance, own_resonance
 
 MASS = {"mass": "0.5 kg", "damping_ratio": 0.02, "duration": "0.1 s"}
@@ -272,3 +272,19 @@ def test_a_contact_that_does_not_converge_names_a_remedy(surface, remedy):
     assert not run.converged
     assert run.notes[0].startswith("Not converged: ")
     assert run.notes[0].endswith(f"Try {remedy}.")
+
+
+@pytest.mark.parametrize(
+    ("clr", "name"),
+    [
+        (0.0, "Full film"),
+        (0.0099, "Full film"),
+        (0.01, "Mixed lubrication"),
+        (0.8999, "Mixed lubrication"),
+        (0.9, "Boundary lubrication"),
+        (1.0, "Boundary lubrication"),
+    ],
+)
+def test_full_film_ends_at_1_and_boundary_lubrication_begins_at_90_percent(clr, name):
+    assert lubrication(clr, lubricated=True) == name
+    assert lubrication(clr, lubricated=False) == "Dry contact"

@@ -113,6 +113,19 @@ def test_the_command_compares_a_folder(tmp_path, monkeypatch, capsys):
         main([*arguments, "--solver", "tamaas"])
     assert end.value.code == 2
     assert "compares asperity alone" in capsys.readouterr().err
+    fitted = few.replace("fits_viscosity = false", "fits_viscosity = true")
+    Path("sets", "few.toml").write_text(fitted.replace("[0.07135", "# [0.07135"), "utf-8")
+    with pytest.raises(SystemExit) as end:
+        main(arguments[:5])
+    assert not end.value.code
+    assert capsys.readouterr().out.startswith("1 measured values in 1 sets: largest scatter")
+    with pytest.raises(SystemExit) as end:
+        main([*arguments[:5], "--out", "a.png"])
+    assert end.value.code == 2
+    assert "a figure needs a set of two" in capsys.readouterr().err
+    Path("sets", "few.toml").write_text(head + "points = []\n", "utf-8")
+    with pytest.raises(BadInput, match="points is empty"):
+        load_experiments(Path("sets"))
     Path("sets", "few.toml").write_text(few.replace("measured [nm]", "measured [um]"), "utf-8")
     with pytest.raises(BadInput, match=r"few\.toml is not a set of measurements"):
         load_experiments(Path("sets"))

@@ -4,16 +4,15 @@ A set of measurements is a file: its case, the conditions and measured value of 
 was given, what had to be assumed, and what was fitted.
 """
 
-import csv
 import math
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from io import StringIO
 from pathlib import Path
 from typing import cast
 
 import numpy as np
+import pandas
 
 from asperity.case import Case, load_case
 from asperity.core import files
@@ -25,9 +24,9 @@ from asperity.results import solve_case
 _IN_PACKAGE = Path(__file__).with_name("experiments")  # of an installed wheel
 _IN_REPOSITORY = Path(__file__).parents[3] / "benchmark" / "experiments"
 UNITS = {"nm": 1e-9, "Hz": 1.0}  # of measured values, in SI
-MAX_FITS = 6  # rounds; each divides the deviation of the mean ratio by about ten
+MAX_FITS = 6  # rounds; two or three suffice
 FIT_TOLERANCE = 1e-3  # of the mean ratio
-FIT_POWER = 0.67  # of viscosity in film formulas
+FIT_POWER = 0.67  # of viscosity in film formulas, for the first round
 VISCOSITY, ALPHA = "lubricant.viscosity_40", "lubricant.alpha"
 
 
@@ -159,16 +158,24 @@ class ExperimentResult:
     comparisons: tuple[Comparison, ...]
 
     def verdict(self) -> str:
-        """Return one sentence: sets, points, and deviations where the viscosity is known."""
-        known = [entry for entry in self.comparisons if entry.mean_interval is not None]
+        """Return one sentence: points, sets, and deviations of films where nothing is fitted."""
+        ratios = [
+            point.ratio
+            for comparison in self.comparisons
+            if comparison.mean_interval is not None
+            for point in comparison.points
+        ]
+        without_fit = (
+            f"computed over measured films without a fit {np.mean(ratios):.2f} in the mean "
+            f"({min(ratios):.2f} to {max(ratios):.2f}); "
+            if ratios
+            else ""
+        )
         points = sum(len(comparison.points) for comparison in self.comparisons)
-        ratios = [point.ratio for comparison in known for point in comparison.points]
         worst = max(self.comparisons, key=lambda comparison: comparison.scatter)
         return (
-            f"{points} measured values in {len(self.comparisons)} sets: where the viscosity is "
-            f"known, computed over measured is {np.mean(ratios):.2f} in the mean "
-            f"({min(ratios):.2f} to {max(ratios):.2f}); the largest scatter of a set is "
-            f"{100.0 * worst.scatter:.1f} % ({worst.experiment.title})."
+            f"{points} measured values in {len(self.comparisons)} sets: {without_fit}largest "
+            f"scatter of a set {100.0 * worst.scatter:.1f} % ({worst.experiment.title})."
         )
 
     def rows(self) -> list[dict[str, object]]:
@@ -186,6 +193,7 @@ class ExperimentResult:
                 "experiment": comparison.experiment.name,
                 "title": comparison.experiment.title,
                 "source": comparison.experiment.source,
+                "rig": comparison.experiment.rig,
                 "given": comparison.experiment.given,
                 "assumed": comparison.experiment.assumed,
                 "fitted_viscosity": comparison.fitted_viscosity,
@@ -203,12 +211,7 @@ class ExperimentResult:
 
     def save(self, path: Path) -> Path:
         """Write the rows as CSV."""
-        text = StringIO()
-        rows = self.rows()
-        writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-        files.write_text(path, text.getvalue())
+        files.write_csv(path, pandas.DataFrame(self.rows()))
         return path
 
 
@@ -232,6 +235,8 @@ def _read(path: Path) -> Experiment:
         content = tomllib.loads(path.read_text("utf-8"))
         case = load_case(content.pop("case"))
         columns, rows = content.pop("columns"), content.pop("points")
+        if not rows:
+            raise ValueError("points is empty")
         return Experiment(
             name=path.stem,
             case=case,
@@ -298,12 +303,17 @@ def compare_with(experiment: Experiment) -> Comparison:
     viscosity = None if sheet is None else sheet.viscosity_40
     if viscosity is None:
         raise BadInput(f"{experiment.name} needs {VISCOSITY}, which is to be fitted")
+    power, before = FIT_POWER, None  # secant method for ln(mean ratio) over ln(viscosity)
     for _ in range(MAX_FITS):
         case = experiment.case.with_overrides({VISCOSITY: viscosity})
         comparison = Comparison(experiment, _compute(experiment, case), viscosity)
         if abs(comparison.mean - 1.0) < FIT_TOLERANCE:
             return comparison
-        viscosity *= comparison.mean ** (-1.0 / FIT_POWER)
+        here = math.log(viscosity), math.log(comparison.mean)
+        if before is not None:
+            power = (here[1] - before[1]) / (here[0] - before[0])
+        before = here
+        viscosity *= comparison.mean ** (-1.0 / power)
     raise AsperityError(
         f"{experiment.name}: the fit of the viscosity did not converge in {MAX_FITS} rounds; state "
         f"{VISCOSITY} closer to {1e6 * viscosity:.3g} mm^2/s"

@@ -104,6 +104,6 @@ class RatingSection(Section):
             )
         if self.contamination is not None and not 0.0 <= self.contamination <= 1.0:
             raise BadInput(
-                "rating.contamination is e_C of ISO 281, from 0 (severe contamination) to 1 "
+                "rating.contamination must be e_C of ISO 281, from 0 (severe contamination) to 1 "
                 f"(clean), got {self.contamination:g}"
             )

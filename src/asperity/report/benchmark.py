@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
 from asperity.benchmark import BenchmarkResult, Comparison, ExperimentResult
+from asperity.core.errors import BadInput
 from asperity.core.quantities import quantity
 from asperity.report.style import BLUE, GREEN, GREY, ON_PAGE, SPLIT_COLOUR, VERMILION
 
@@ -64,6 +65,8 @@ def _panel(axes: Axes, result: BenchmarkResult) -> None:
 def experiment_figure(result: ExperimentResult) -> Figure:
     """Draw measured and computed values, and their ratio, over the varied value; a row per set."""
     shown = [entry for entry in result.comparisons if len(entry.points) > 1]
+    if not shown:
+        raise BadInput("a figure needs a set of two or more measured values; write a .csv")
     figure = Figure(figsize=(ON_PAGE.double, 2.6 * len(shown)), layout="constrained")
     rows = figure.subplots(len(shown), 2, squeeze=False, sharex="row")
     for (values, ratios), entry in zip(rows, shown, strict=True):
