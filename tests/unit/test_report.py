@@ -334,6 +334,7 @@ def test_runs_are_labelled_by_their_differences_only(several):
         "Hertz (smooth, dry)",
         "Regime",
         "Dimensionless numbers",
+        "Inlet shear heating",
     ]  # at 400 N the bodies count as rigid
     assert sorted(names) == sorted([*given, *fits, "Grid"])  # the grid is given in half-widths
     assert next(row for row in several.rows if row[0] == "Load")[1:] == ["500 N (50 N/mm)"] * 2 + [

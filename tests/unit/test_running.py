@@ -2,7 +2,7 @@
 
 import json
 import math
-from dataclasses import replace
+from dataclasses import make_dataclass, replace
 from itertools import count, islice
 from pathlib import Path
 from types import SimpleNamespace
@@ -30,6 +30,8 @@ from asperity.transient.motion import step_seconds
 
 PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"
 RUNNING = {"grid.cells": [64, 32]}
+
+Step = make_dataclass("Step", ("number", "solution", "memory"))
 
 
 def series(values, *, steps_per_passage=10, **zones):
@@ -265,7 +267,7 @@ def test_steps_and_length_of_a_series_follow_the_speed_of_the_roughness(
     def march(*_, time_step, **__):
         steps.append(time_step)
         for number in count():
-            yield SimpleNamespace(number=number, solution=converged)
+            yield Step(number, converged, {})
 
     monkeypatch.setattr("asperity.transient.running.moving_contact", march)
     surfaces = case.moving_surfaces()

@@ -439,7 +439,7 @@ def test_a_lay_along_rolling_gives_a_steady_solution():
 def test_motion_resumes_from_its_memory_to_the_last_digit():
     surface = rough(ON, 1.5e-6, correlation_length=40e-6)
     whole = list(islice(moving(surface), 4))
-    remainder = list(islice(moving(surface, resume=whole[1].memory), 2))
+    remainder = list(islice(moving(surface, start=whole[1].memory), 2))
     for expected, resumed in zip(whole[2:], remainder, strict=True):
         assert expected.number == resumed.number
         np.testing.assert_array_equal(expected.solution.pressure, resumed.solution.pressure)
@@ -480,7 +480,7 @@ def test_an_unsolved_step_is_marked():
     good = next(moving(surface))
     marked = MovingSurfaces.one_rough(surface, PURE_ROLLING)
     rolling = contact(hardness=CAP, surface_speeds=PURE_ROLLING)
-    bad = next(moving_contact(rolling, barus(), marked, options=few, resume=good.memory))
+    bad = next(moving_contact(rolling, barus(), marked, options=few, start=good.memory))
     assert not bad.solution.convergence.converged
     assert bad.solution.convergence.iterations <= 100
 

@@ -32,14 +32,14 @@ def test_computed_values_agree_as_documented(name):
     comparison = compare_with(experiment)
     assert comparison.mean == pytest.approx(experiment.mean, abs=0.004)
     assert comparison.scatter == pytest.approx(experiment.scatter, abs=0.003)
-    assert comparison.heated_scatter == pytest.approx(experiment.heated_scatter, abs=0.003)
+    assert comparison.isothermal_scatter == pytest.approx(experiment.isothermal_scatter, abs=0.003)
     assert (comparison.fitted_viscosity is None) is not experiment.fits_viscosity
     known = name in ("fva3-25c", "fva3-54c", "unnamed-100c")
     assert (comparison.mean_interval is not None) is known
     if name == "fva3-25c":
         low, high = comparison.mean_interval
         assert low < 1.0 < high
-        assert experiment.heated_scatter <= 0.025
+        assert experiment.scatter <= 0.027
         widths = [(p.high - p.low) / p.computed for p in comparison.points]
         assert 0.15 < np.median(widths) < 0.25  # alpha to 20 %, and film ~ alpha^0.5
 
@@ -54,7 +54,7 @@ def test_the_page_states_every_set():
         assert cells[1] == str(len(experiment.points))
         assert float(cells[2].replace(",", "").split()[0]) == experiment.mean
         assert cells[3] == f"{100.0 * experiment.scatter:.1f} %"
-        assert cells[4].endswith(f" {100.0 * experiment.heated_scatter:.1f} %")
+        assert cells[4].endswith(f" {100.0 * experiment.isothermal_scatter:.1f} %")
         assert experiment.source.split(" (")[0].split(";")[0].removeprefix("github.com/") in text
     assert f"{sum(len(experiment.points) for experiment in films)} films in five sets" in text
 

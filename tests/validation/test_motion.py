@@ -231,7 +231,7 @@ def test_resuming_from_a_snapshot_gives_identical_results():
     )
     uninterrupted = list(islice(moving_contact(conditions, paper.barus(), surfaces), 7))
     memory = {name: values.copy() for name, values in uninterrupted[3].memory.items()}
-    continued = list(islice(moving_contact(conditions, paper.barus(), surfaces, resume=memory), 3))
+    continued = list(islice(moving_contact(conditions, paper.barus(), surfaces, start=memory), 3))
     for expected, resumed in zip(uninterrupted[4:], continued, strict=True):
         assert expected.number == resumed.number
         assert np.array_equal(expected.solution.pressure, resumed.solution.pressure)

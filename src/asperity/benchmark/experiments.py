@@ -7,7 +7,7 @@ was given, what had to be assumed, and what was fitted.
 import math
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import cast
 
@@ -18,7 +18,6 @@ from asperity.case import Case, load_case
 from asperity.core import files
 from asperity.core.errors import AsperityError, BadInput
 from asperity.core.quantities import quantity
-from asperity.ehl import inlet_heating_factor
 from asperity.results import solve_case
 
 _IN_PACKAGE = Path(__file__).with_name("experiments")  # of an installed wheel
@@ -54,8 +53,8 @@ class Experiment:
     missed : where computation and measurement differ, in words; may be empty
     key : key of the measured quantity in the catalogue
     swept : name and unit of the value that varies from point to point
-    mean, scatter, heated_scatter : of computed over measured, the last with the factor for inlet
-        shear heating, as documented; the tests hold the solver to them
+    mean, scatter, isothermal_scatter : of computed over measured, the last without inlet shear
+        heating, as documented; the tests hold the solver to them
     """
 
     name: str
@@ -70,7 +69,7 @@ class Experiment:
     swept: str
     mean: float
     scatter: float
-    heated_scatter: float
+    isothermal_scatter: float
     case: Case
     points: tuple[MeasuredPoint, ...]
 
@@ -80,8 +79,8 @@ class ComparedPoint:
     """Measured and computed value [SI], and the limits of the computed one.
 
     The limits contain the discretisation error and the interval of an estimated pressure-viscosity
-    coefficient; None where the viscosity was fitted, and for dry contacts. `inlet_heating` is the
-    published factor for inlet shear heating, which the solution does not contain.
+    coefficient; None where the viscosity was fitted, and for dry contacts. `isothermal` is the
+    value computed without inlet shear heating.
     """
 
     experiment: str
@@ -92,7 +91,7 @@ class ComparedPoint:
     computed: float
     low: float | None
     high: float | None
-    inlet_heating: float
+    isothermal: float
 
     @property
     def ratio(self) -> float:
@@ -100,9 +99,9 @@ class ComparedPoint:
         return self.computed / self.measured
 
     @property
-    def heated_ratio(self) -> float:
-        """Computed times `inlet_heating` over measured."""
-        return self.ratio * self.inlet_heating
+    def isothermal_ratio(self) -> float:
+        """Isothermal over measured."""
+        return self.isothermal / self.measured
 
 
 @dataclass(frozen=True)
@@ -124,14 +123,14 @@ class Comparison:
         return float(np.std([point.ratio / self.mean for point in self.points]))
 
     @property
-    def heated_mean(self) -> float:
-        """Mean of computed times `inlet_heating` over measured."""
-        return float(np.mean([point.heated_ratio for point in self.points]))
+    def isothermal_mean(self) -> float:
+        """Mean of isothermal over measured."""
+        return float(np.mean([point.isothermal_ratio for point in self.points]))
 
     @property
-    def heated_scatter(self) -> float:
-        """Standard deviation of the same about its mean."""
-        ratios = [point.heated_ratio / self.heated_mean for point in self.points]
+    def isothermal_scatter(self) -> float:
+        """Standard deviation of isothermal over measured about its mean."""
+        ratios = [point.isothermal_ratio / self.isothermal_mean for point in self.points]
         return float(np.std(ratios))
 
     @property
@@ -181,7 +180,7 @@ class ExperimentResult:
     def rows(self) -> list[dict[str, object]]:
         """Return a row per point."""
         return [
-            asdict(point) | {"ratio": point.ratio, "heated_ratio": point.heated_ratio}
+            asdict(point) | {"ratio": point.ratio, "isothermal_ratio": point.isothermal_ratio}
             for comparison in self.comparisons
             for point in comparison.points
         ]
@@ -200,8 +199,8 @@ class ExperimentResult:
                 "points": len(comparison.points),
                 "mean_ratio": comparison.mean,
                 "scatter": comparison.scatter,
-                "heated_mean_ratio": comparison.heated_mean,
-                "heated_scatter": comparison.heated_scatter,
+                "isothermal_mean_ratio": comparison.isothermal_mean,
+                "isothermal_scatter": comparison.isothermal_scatter,
                 "mean_interval": comparison.mean_interval,
                 "missed": comparison.experiment.missed,
             }
@@ -298,7 +297,8 @@ def compare_experiments(
 def compare_with(experiment: Experiment) -> Comparison:
     """Compute every point of a set, with a fitted viscosity if the set requires it."""
     if not experiment.fits_viscosity:
-        return Comparison(experiment, _compute(experiment, experiment.case), None)
+        points = _compute(experiment, experiment.case)
+        return Comparison(experiment, _without_heat(experiment, experiment.case, points), None)
     sheet = experiment.case.oil_sheet
     viscosity = None if sheet is None else sheet.viscosity_40
     if viscosity is None:
@@ -308,7 +308,8 @@ def compare_with(experiment: Experiment) -> Comparison:
         case = experiment.case.with_overrides({VISCOSITY: viscosity})
         comparison = Comparison(experiment, _compute(experiment, case), viscosity)
         if abs(comparison.mean - 1.0) < FIT_TOLERANCE:
-            return comparison
+            points = _without_heat(experiment, case, comparison.points)
+            return replace(comparison, points=points)
         here = math.log(viscosity), math.log(comparison.mean)
         if before is not None:
             power = (here[1] - before[1]) / (here[0] - before[0])
@@ -342,14 +343,29 @@ def _compute(experiment: Experiment, case: Case) -> tuple[ComparedPoint, ...]:
                 computed=value,
                 low=low,
                 high=high,
-                inlet_heating=1.0
-                if at_point.lubricant is None
-                else inlet_heating_factor(
-                    at_point.conditions, at_point.lubricant, at_point.thermal
-                ),
+                isothermal=value,
             )
         )
     return tuple(points)
+
+
+def _without_heat(
+    experiment: Experiment, case: Case, points: tuple[ComparedPoint, ...]
+) -> tuple[ComparedPoint, ...]:
+    """Return the points with their values without inlet shear heating."""
+    if case.lubricant is None:
+        return points
+    cold = case.with_overrides({"thermal.inlet_heating": False})
+    return tuple(
+        replace(
+            compared,
+            isothermal=cast(
+                float,
+                solve_case(cold.with_overrides(point.conditions)).summary()[experiment.key],
+            ),
+        )
+        for compared, point in zip(points, experiment.points, strict=True)
+    )
 
 
 def _alpha_effect(experiment: Experiment, case: Case) -> tuple[float, float] | None:

@@ -122,6 +122,7 @@ class ThermalSection(_Numbers):  # type: ignore[misc]  # fields of `Thermal` and
         Section, "exponential"
     )
     feedback: Annotated[bool, Strict()] = Thermal().feedback
+    inlet_heating: Annotated[bool, Strict()] | None = Thermal().inlet_heating
 
     @property
     def defaulted(self) -> tuple[str, ...]:
@@ -159,4 +160,5 @@ class ThermalSection(_Numbers):  # type: ignore[misc]  # fields of `Thermal` and
             warmth=warmth,
             solids=(first, second),
             feedback=self.feedback,
+            inlet_heating=self.inlet_heating,
         )

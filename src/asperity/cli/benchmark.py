@@ -111,7 +111,7 @@ def _set_rows(result: "ExperimentResult") -> Block:
             str(len(entry.points)),
             f"{entry.mean:.3f}" if entry.fitted_viscosity is None else "1, fitted",
             f"{100.0 * entry.scatter:.1f}",
-            f"{100.0 * entry.heated_scatter:.1f}",
+            f"{100.0 * entry.isothermal_scatter:.1f}",
             "" if (ends := entry.mean_interval) is None else f"{ends[0]:.2f} to {ends[1]:.2f}",
         ]
         for entry in result.comparisons
@@ -121,7 +121,7 @@ def _set_rows(result: "ExperimentResult") -> Block:
         "points",
         "mean ratio",
         "scatter [%]",
-        "with inlet heating [%]",
+        "isothermal [%]",
         "interval of the mean",
     ]
     yield from columns(heads, rows, left=1)

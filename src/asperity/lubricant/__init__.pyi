@@ -1,3 +1,4 @@
+from .data_sheet import EXPANSION as EXPANSION
 from .data_sheet import OilSheet as OilSheet
 from .data_sheet import Thickening as Thickening
 from .density import DENSITY_LAWS as DENSITY_LAWS

@@ -99,6 +99,7 @@ class Thermal(Parametric):
     warmth : temperature-viscosity law
     solids : the two bodies
     feedback : couple film temperature to viscosity, friction and film thickness (thermal EHL)
+    inlet_heating : compute inlet shear heating; None: where it matters
 
     Raises
     ------
@@ -114,6 +115,7 @@ class Thermal(Parametric):
     warmth: WarmthLaw = ExponentialWarmth()
     solids: tuple[Solid, Solid] = (Solid(), Solid())
     feedback: bool = False
+    inlet_heating: bool | None = None
 
     @property
     def bulk_rise(self) -> tuple[float, float]:

@@ -102,8 +102,8 @@ def _values_panel(axes: Axes, entry: Comparison) -> None:
 def _ratio_panel(axes: Axes, entry: Comparison) -> None:
     x = [point.swept for point in entry.points]
     axes.semilogx(x, [point.ratio for point in entry.points], "o-", color=BLUE, markersize=3)
-    heated = [point.heated_ratio for point in entry.points]
-    axes.semilogx(x, heated, ":", color=GREEN, label="with factor for inlet shear heating")
+    isothermal = [point.isothermal_ratio for point in entry.points]
+    axes.semilogx(x, isothermal, ":", color=GREEN, label="without inlet shear heating")
     axes.legend()
     axes.axhline(1.0, color=GREY, linewidth=0.8)
     axes.set_ylabel("computed / measured")

@@ -43,6 +43,7 @@ from asperity.solution import (
     axial_distribution,
     clr_below,
     friction_and_heat,
+    heated_inlet,
     own_resonance,
     regime_card,
     sharing_by_film,
@@ -273,7 +274,9 @@ class Run(Displayed):
     @cached_property
     def card(self) -> RegimeCard:
         """Regime card: kind of contact, and comparison with published film formulas."""
-        card = regime_card(self.solution)
+        solution, thermal = self.solution, self.case.thermal
+        contact = solution.conditions, solution.lubricant, solution.grid
+        card = regime_card(solution, thermal, heated_inlet(*contact, thermal))
         if self.running is None:
             return card
         slope = self.state.rms_slope

@@ -38,6 +38,7 @@ from asperity.solution import (
     clr_below,
     friction,
     friction_and_heat,
+    inlet_viscosity_factor,
     sharing_by_film,
     subsurface_stress,
 )
@@ -226,9 +227,7 @@ def run_tracks(
             series = further[0]().value if coarse_cells else None
             return 0 if series is None else series.length
 
-        fine = _track(
-            case, cells, passages=length if coarse_cells else None, keep=True, progress=progress
-        )
+        fine = _track(case, cells, passages=length if coarse_cells else None, progress=progress)
         own = further[0]() if coarse_cells else Determined(fine)
         others = [outcome() for number, outcome in further.items() if number > 0]
     if own.value is None:  # without the coarse grid, the other tracks cannot be corrected
@@ -318,7 +317,6 @@ def _track(
     cells: tuple[int, int],
     *,
     passages: Callable[[], int] | None = None,
-    keep: bool = False,
     progress: TrackProgress = NO_PROGRESS,
 ) -> Series:
     """March a case's track on one grid, with one thread for the algebra."""
@@ -332,18 +330,21 @@ def _track(
         )
         numbers = read(_Sources(snapshot.state, snapshot.solution, rubbing), entries)
         values = {key: math.nan if value is None else value for key, value in numbers.items()}
-        return {"time_s": snapshot.time, **values, **_rolling_friction(snapshot)}
+        return {"time_s": snapshot.time, **values, **snapshot.rolling_friction}
 
     assert case.lubricant is not None
     with threadpool_limits(1):
+        surfaces = running_surfaces(case).on_cells(cells)
         return run_track(
             case.conditions,
             case.lubricant,
-            running_surfaces(case).on_cells(cells),
+            surfaces,
             measure,
             passages=passages,
             options=case.options,
-            keep=keep,
+            viscosity_factor=inlet_viscosity_factor(
+                case.conditions, case.lubricant, surfaces.grid, case.thermal
+            ),
             progress=progress.steps,
         )
 
@@ -354,21 +355,6 @@ def running_surfaces(case: Case, passages: int = PASSAGES) -> MovingSurfaces:
     fastest = max(map(abs, conditions.surface_speeds)) / conditions.entrainment_speed
     zones = case.grid.extent[0] / (2.0 * conditions.hertz.half_widths[0])
     return case.moving_surfaces(min(math.ceil(passages * fastest / zones), MOST_TRACK_LENGTHS))
-
-
-def _rolling_friction(snapshot: Snapshot) -> dict[str, float]:
-    """Return the rolling friction that dissipates the power of the pressure-driven flow.
-
-    On moving roughness the pressure also works on slopes, on which the sum of (h/2) dp/dx has no
-    bearing; over time the work on both bodies is what the flow dissipates.
-    """
-    conditions, power = snapshot.solution.conditions, snapshot.flow_power
-    force = power / (2.0 * conditions.entrainment_speed)
-    return {
-        "rolling_friction_power_w": power,
-        "rolling_friction_force_n": force,
-        "rolling_friction_coefficient": force / conditions.load,
-    }
 
 
 def _entries(groups: tuple[str, ...]) -> list[Quantity]:
@@ -446,5 +432,9 @@ def _further_track(
     number: int,
     progress: TrackProgress = NO_PROGRESS,
 ) -> Determined[Series]:
-    """Return a track, or the reason why there is none."""
-    return Determined.attempt(lambda: _track(case.on_surface(number), cells, progress=progress))
+    """Return a track without its snapshots, or the reason why there is none."""
+
+    def series() -> Series:
+        return _track(case.on_surface(number), cells, progress=progress)._replace(kept=())
+
+    return Determined.attempt(series)

@@ -227,36 +227,66 @@ def flash_temperature(
     """
     thermal = thermal or Thermal()
     conditions = solution.conditions
-    grid = solution.grid
     friction_result = friction_result or friction(solution, thermal=thermal)
     heat = np.abs(friction_result.shear) * conditions.sliding_speed
-    bodies = tuple(
-        moving_source(grid.cells, grid.spacing, speed, solid, length=conditions.length)
-        for speed, solid in zip(conditions.surface_speeds, thermal.solids, strict=True)
-    )
-    resistance, exchanging = _film_resistance(solution, thermal)
+    bodies = HeatedBodies(solution, thermal)
     bulk_1, bulk_2 = thermal.bulk_rise
-    exchanged = _heat_across_film(bodies, heat, resistance, exchanging, bulk_2 - bulk_1)
-    into_1 = 0.5 * heat + exchanged
-    into_2 = 0.5 * heat - exchanged
-    rise_1 = bodies[0](into_1)
-    rise_2 = bodies[1](into_2)
-    surface_1 = bulk_1 + rise_1
-    surface_2 = bulk_2 + rise_2
+    rises = bodies(heat, bulk_2 - bulk_1)
+    surface_1, surface_2 = bulk_1 + rises.rise_1, bulk_2 + rises.rise_2
     # parabolic temperature profile across the film
-    film = 0.5 * (surface_1 + surface_2) + heat * resistance / 12.0
-    area = _cell_area(solution)
+    film = 0.5 * (surface_1 + surface_2) + heat * bodies.resistance / 12.0
+    area = cell_area(solution)
     return FlashTemperature(
         surface_1=surface_1,
         surface_2=surface_2,
         film=film,
         heat=heat,
-        into_1=into_1,
-        max_k=float(max(rise_1.max(), rise_2.max())),
+        into_1=rises.into_1,
+        max_k=float(max(rises.rise_1.max(), rises.rise_2.max())),
         film_max_k=float(film.max()),
-        heat_1_w=float(into_1.sum() * area),
-        heat_2_w=float(into_2.sum() * area),
+        heat_1_w=float(rises.into_1.sum() * area),
+        heat_2_w=float(rises.into_2.sum() * area),
     )
+
+
+@dataclass(frozen=True)
+class SurfaceRises:
+    """Heat that flows into both bodies [W/m^2], and the rise of their surfaces [K], (nx, ny)."""
+
+    into_1: Field
+    into_2: Field
+    rise_1: Field
+    rise_2: Field
+
+    @property
+    def mean_rise(self) -> Field:
+        """Mean of both surfaces."""
+        return 0.5 * (self.rise_1 + self.rise_2)
+
+
+class HeatedBodies:
+    """Both bodies of a solved contact under heat that its film divides between them."""
+
+    def __init__(self, solution: ContactSolution, thermal: Thermal) -> None:
+        grid, conditions = solution.grid, solution.conditions
+        self.sources = tuple(
+            moving_source(grid.cells, grid.spacing, speed, solid, length=conditions.length)
+            for speed, solid in zip(conditions.surface_speeds, thermal.solids, strict=True)
+        )
+        self.resistance, self.exchanging = _film_resistance(solution, thermal)
+
+    def __call__(self, heat: Field, bulk_difference: float = 0.0) -> SurfaceRises:
+        """Return the response to a heat input [W/m^2].
+
+        `bulk_difference` [K] is the bulk temperature of body 2 less that of body 1.
+        """
+        exchanged = _heat_across_film(
+            self.sources, heat, self.resistance, self.exchanging, bulk_difference
+        )
+        into_1 = 0.5 * heat + exchanged
+        into_2 = 0.5 * heat - exchanged
+        first, second = self.sources
+        return SurfaceRises(into_1, into_2, first(into_1), second(into_2))
 
 
 def _film_resistance(solution: ContactSolution, thermal: Thermal) -> tuple[Field, Mask]:
@@ -267,7 +297,7 @@ def _film_resistance(solution: ContactSolution, thermal: Thermal) -> tuple[Field
     return resistance, np.ones(solution.grid.cells, dtype=bool)
 
 
-def _cell_area(solution: ContactSolution) -> float:
+def cell_area(solution: ContactSolution) -> float:
     """Return the area [m^2] of a cell, that of a line contact in proportion to its length."""
     grid = solution.grid
     length = solution.conditions.length

@@ -6,7 +6,7 @@ boundary lubrication, by CLR.
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from asperity.ehl import (
     film_numbers,
     flooded_inlet,
     hertz_zone,
+    inlet_heating_factor,
     inlet_length,
     least_film,
     loss_beyond_body,
@@ -28,6 +29,10 @@ from asperity.ehl import (
 from asperity.ehl.film_formulas import Place
 from asperity.ehl.grid_design import MIN_CELLS_IN_INLET
 from asperity.ehl.load_shares import CENTRE
+from asperity.lubricant import Thermal
+
+if TYPE_CHECKING:  # it loads the solver
+    from asperity.solution.inlet import InletHeating
 
 _NUMBERS = {  # key in the catalogue -> field
     "speed_number": "speed",
@@ -67,8 +72,9 @@ class RegimeCard:
     dimensionless numbers, the regime, and the film formulas valid there; the last three are None or
     empty for a dry contact. `fits` is also empty for a contact narrower across rolling than along
     it, which no formula covers. Then the film ratio, and Sdq of the roughness in the Hertz zone, on
-    which CLR depends more. `comparable` is False if roughness affects the film: the formulas hold
-    for smooth bodies.
+    which CLR depends more. `comparable` is False if roughness or heat affects the film: the
+    formulas hold for smooth bodies and isothermal oil. `inlet_heating_fit` is the published factor
+    of inlet shear heating on the film, `inlet_heating` the solved one, if it is computed.
     """
 
     half_width: float
@@ -81,9 +87,12 @@ class RegimeCard:
     lambda_ratio: float | None
     rms_slope: float
     comparable: bool
+    inlet_heating_fit: float | None = None
+    inlet_heating: "InletHeating | None" = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return the card as a dictionary for JSON in SI units; None if undefined."""
+        heat = self.inlet_heating
         return {
             "half_width_m": self.half_width,
             "half_width_across_m": self.half_width_across,
@@ -96,6 +105,9 @@ class RegimeCard:
             "regime": self.regime,
             "lambda_ratio": self.lambda_ratio,
             "rms_slope": self.rms_slope,
+            "inlet_heating_fit": self.inlet_heating_fit,
+            "inlet_heating_factor": heat and heat.film_factor,
+            "inlet_temperature_rise_k": heat and heat.max_k,
             "fits": [
                 {
                     "source": fit.source,
@@ -138,22 +150,41 @@ class RegimeCard:
             return rows
         numbers = ", ".join(quantity(key).named(values[key]) for key in _NUMBERS)
         rows += [("regime", str(self.regime)), ("dimensionless numbers", numbers)]
+        rows.append(("inlet shear heating", self._inlet()))
         return rows + [
             (f"fitted {quantity(_PLACES[fit.place]).name}, {fit.source}", self._fitted(fit))
             for fit in self.fits
         ]
 
+    def _inlet(self) -> str:
+        """Return the effect of inlet shear heating on the film, as solved and by the fit."""
+        assert self.inlet_heating_fit is not None  # of a lubricated contact
+        fit = quantity("inlet_heating_fit").named(self.inlet_heating_fit)
+        heat = self.inlet_heating
+        if heat is None:
+            return f"not computed, {fit}"
+        solved = quantity("inlet_heating_factor").named(heat.film_factor)
+        return f"{solved}, {quantity('inlet_temperature_rise_k').named(heat.max_k)}, {fit}"
+
     def _fitted(self, fit: FittedFilm) -> str:
         """Return a fitted film, beside the solved one where they are comparable."""
         film = quantity("film_thickness_m")
         if not self.comparable:
-            return f"{film.text(fit.film)}, of smooth bodies"
+            return f"{film.text(fit.film)}, of smooth bodies and isothermal oil"
         deviation = quantity("film_deviation").text(fit.deviation)
         return f"{film.text(fit.film)}; solved {film.text(fit.solved)}, {deviation}"
 
 
-def regime_card(solution: ContactSolution) -> RegimeCard:
-    """Return the regime card of a solved contact."""
+def regime_card(
+    solution: ContactSolution,
+    thermal: Thermal | None = None,
+    inlet: "InletHeating | None" = None,
+) -> RegimeCard:
+    """Return the regime card of a solved contact.
+
+    `thermal` (default `Thermal()`) sets the published factor of inlet shear heating; `inlet` is the
+    solved one, if it is computed.
+    """
     conditions = solution.conditions
     lubricant = solution.lubricant
     hertz = solution.conditions.hertz
@@ -173,6 +204,10 @@ def regime_card(solution: ContactSolution) -> RegimeCard:
         lambda_ratio=film_ratio(solution),
         rms_slope=rms_slope(solution),
         comparable=_full_film(solution),
+        inlet_heating_fit=None
+        if lubricant is None
+        else inlet_heating_factor(conditions, lubricant, thermal or Thermal()),
+        inlet_heating=inlet,
         fits=()
         if lubricant is None
         else tuple(
@@ -202,9 +237,10 @@ def film_ratio(solution: ContactSolution) -> float | None:
 
 
 def _full_film(solution: ContactSolution) -> bool:
-    """Return True if the oil carries all load on a film that roughness does not affect."""
+    """Return True if the oil carries all load on a film without effects of roughness and heat."""
     ratio = film_ratio(solution)
-    return not solution.in_contact.any() and (ratio is None or ratio >= FULL_FILM)
+    isothermal = solution.viscosity_factor is None
+    return isothermal and not solution.in_contact.any() and (ratio is None or ratio >= FULL_FILM)
 
 
 def far_from_fits(solution: ContactSolution) -> str | None:

@@ -1,11 +1,10 @@
 """Friction and heat of a solved contact together, with optional thermal feedback on viscosity.
 
 With `Thermal.feedback` the film temperature sets the oil's shear stress and its viscosity in
-Reynolds' equation; without it heat is only a result.
+Reynolds' equation; without it frictional heat is only a result. Inlet shear heating is separate.
 """
 
 from dataclasses import replace
-from itertools import pairwise
 from typing import TypedDict, Unpack
 
 import numpy as np
@@ -16,7 +15,9 @@ from asperity.core.errors import AsperityError, NotConverged
 from asperity.ehl import ContactSolution, Options, SolveStatus, solve_contact
 from asperity.ehl.strategies.grid_continuation import Progress
 from asperity.lubricant import Lubricant, Thermal
+from asperity.solution.fixed_point import Mixer
 from asperity.solution.flash import FlashTemperature, flash_temperature
+from asperity.solution.inlet import inlet_viscosity_factor
 from asperity.solution.traction import BOUNDARY_FRICTION, Friction, friction, warm_factor
 from asperity.surface import Surface
 
@@ -26,7 +27,6 @@ MAX_ROUNDS = 400
 HOT = 30.0  # rise of the film temperature [K] above which the viscosity of any oil changes clearly
 MAX_SOLVES = 25
 MAX_WARM_ITERATIONS = 40  # a warm start from a slightly colder solution takes about ten
-MEMORY = 5  # previous guesses in Anderson mixing
 
 
 def friction_and_heat(
@@ -99,38 +99,6 @@ class SolveSettings(TypedDict, total=False):
     progress: Progress | None
 
 
-class Mixer:
-    """Anderson mixing for a fixed point; the step is halved when the residual grows.
-
-    Source: D. G. Anderson, J. ACM 12 (1965) 547.
-    """
-
-    def __init__(self) -> None:
-        self.damping, self.last_residual = 1.0, np.inf
-        self.guesses: list[Field] = []
-        self.changes: list[Field] = []
-
-    def __call__(self, guess: Field, change: Field) -> Field:
-        """Return the next guess, given the change that the iteration proposes at `guess`."""
-        residual = float(np.linalg.norm(change))
-        if residual > self.last_residual:
-            self.damping = max(0.5 * self.damping, 0.05)
-            self.guesses, self.changes = [], []
-        self.last_residual = residual
-        self.guesses = [*self.guesses[-MEMORY:], guess]
-        self.changes = [*self.changes[-MEMORY:], change]
-        if len(self.guesses) == 1:
-            return np.asarray(guess + self.damping * change)
-        guesses = np.stack([(new - old).ravel() for old, new in pairwise(self.guesses)], axis=1)
-        changes = np.stack([(new - old).ravel() for old, new in pairwise(self.changes)], axis=1)
-        weights = np.linalg.lstsq(changes, change.ravel(), rcond=1e-10)[0]
-        return (
-            guess
-            + self.damping * change
-            - ((guesses + self.damping * changes) @ weights).reshape(guess.shape)
-        )
-
-
 def solve_thermal_contact(
     conditions: ContactConditions,
     lubricant: Lubricant | None,
@@ -140,12 +108,12 @@ def solve_thermal_contact(
     thermal: Thermal | None = None,
     **settings: Unpack[SolveSettings],
 ) -> ContactSolution:
-    """Solve the contact with the viscosity at the film temperature, if `thermal.feedback` is set.
+    """Solve the contact with inlet shear heating where it is to be computed, and with feedback.
 
-    Contact and heat are solved in turn until the film temperature converges (root mean square of
-    its change below a thousandth of its largest rise). Parameters are those of `solve_contact` and
-    `friction_and_heat`; the solution carries the viscosity factors and the iterations of all
-    solves.
+    With `thermal.feedback`, contact and heat are solved in turn until the film temperature
+    converges (root mean square of its change below a thousandth of its largest rise). Parameters
+    are those of `solve_contact` and `friction_and_heat`; the solution carries the viscosity factors
+    and the iterations of all solves.
 
     Raises
     ------
@@ -153,9 +121,12 @@ def solve_thermal_contact(
         as those two; NotConverged also if contact and heat do not converge.
     """
     thermal = thermal or Thermal()
-    solution = solve_contact(conditions, lubricant, surface, **settings)
-    isothermal = lubricant is None or not thermal.feedback or conditions.sliding_speed == 0.0
-    if isothermal or not solution.convergence.converged:
+    inlet_factor = inlet_viscosity_factor(conditions, lubricant, surface.grid, thermal)
+    solution = solve_contact(
+        conditions, lubricant, surface, viscosity_factor=inlet_factor, **settings
+    )
+    cold = lubricant is None or not thermal.feedback or conditions.sliding_speed == 0.0
+    if cold or not solution.convergence.converged:
         return solution
     options = settings.get("options") or Options()
     solution, settled = _iterate_with_heat(
@@ -163,6 +134,7 @@ def solve_thermal_contact(
         options,
         boundary_friction=boundary_friction,
         thermal=thermal,
+        inlet_factor=1.0 if inlet_factor is None else inlet_factor,
         progress=settings.get("progress"),
     )
     status = SolveStatus.CONVERGED if settled else SolveStatus.OUT_OF_ITERATIONS
@@ -178,9 +150,10 @@ def _iterate_with_heat(
     *,
     boundary_friction: float,
     thermal: Thermal,
+    inlet_factor: Field | float,
     progress: Progress | None,
 ) -> tuple[ContactSolution, bool]:
-    """Solve contact and heat in turn from an isothermal solution; return convergence, too."""
+    """Solve contact and heat in turn from a solution without feedback; return convergence, too."""
     history = solution.convergence.history
     seconds = solution.convergence.seconds
     warm_options = replace(options, max_iterations=min(options.max_iterations, MAX_WARM_ITERATIONS))
@@ -201,7 +174,8 @@ def _iterate_with_heat(
             solution.surface,
             options=warm_options,
             start=solution,
-            viscosity_factor=warm_factor(solution, thermal, thermal.ambient + target),
+            viscosity_factor=inlet_factor
+            * warm_factor(solution, thermal, thermal.ambient + target),
             strict=False,
             progress=progress,
         )

@@ -70,6 +70,21 @@ class Snapshot:
     track_sq: float
     memory: Memory
 
+    @property
+    def rolling_friction(self) -> dict[str, float]:
+        """Rolling friction that dissipates the power of the pressure-driven flow, by key.
+
+        On moving roughness the pressure also works on slopes, on which the sum of (h/2) dp/dx has
+        no bearing; over time the work on both bodies is what the flow dissipates.
+        """
+        conditions, power = self.solution.conditions, self.flow_power
+        force = power / (2.0 * conditions.entrainment_speed)
+        return {
+            "rolling_friction_power_w": power,
+            "rolling_friction_force_n": force,
+            "rolling_friction_coefficient": force / conditions.load,
+        }
+
 
 Steps = Callable[..., Iterator[Snapshot]]  # interface of a transient model
 
@@ -79,11 +94,11 @@ def moving_contact(
     lubricant: Lubricant,
     surfaces: MovingSurfaces,
     *,
-    start: Start = "steady",
-    resume: Memory | None = None,
+    start: Start | Memory = "steady",
     time_step: float = 1.0,
     flattening: bool = False,
     options: Options | None = None,
+    viscosity_factor: Field | None = None,
 ) -> Iterator[Snapshot]:
     """Yield the contact at time 0 and after each time step, without end.
 
@@ -92,12 +107,13 @@ def moving_contact(
     conditions, lubricant : the contact and its oil; the load is constant
     surfaces : roughness of both bodies and its speeds
     start : "steady" from the steady solution with stationary roughness; "stationary" from rest,
-        with dry contact and all gaps full of oil
-    resume : `memory` of an earlier snapshot to continue from; that snapshot is not yielded again
+        with dry contact and all gaps full of oil; or `memory` of an earlier snapshot to continue
+        from, which is not yielded again
     time_step : over the transit time of the oil through a cell; 1 follows the oil
     flattening : lower the rough surface permanently by the overlap that the pressure cap permits
         (half each if both are rough)
     options : solver settings of every step; default `Options()`
+    viscosity_factor : local over isothermal viscosity, (nx, ny), as by inlet shear heating
 
     A step that does not converge, the first included, is yielded, marked in `solution.convergence`,
     and the next step starts from it.
@@ -115,19 +131,27 @@ def moving_contact(
             "1 follows the "
             "oil"
         )
-    if start not in ("steady", "stationary"):
+    if isinstance(start, str) and start not in ("steady", "stationary"):
         raise BadInput(f"start must be steady or stationary, got {start!r}")
     contact = _TransientContact(
-        conditions, lubricant, surfaces, options or Options(), time_step, flattening
+        conditions,
+        lubricant,
+        surfaces,
+        options or Options(),
+        time_step,
+        viscosity_factor,
+        flattening=flattening,
     )
-    if resume is None:
+    if isinstance(start, str):
         first = contact.start(steady=start == "steady")
         yield first
-        resume = first.memory
-    for number in count(int(resume["number"]) + 1):
-        snapshot = contact.step(number, resume)
+        memory = first.memory
+    else:
+        memory = start
+    for number in count(int(memory["number"]) + 1):
+        snapshot = contact.step(number, memory)
         yield snapshot
-        resume = snapshot.memory
+        memory = snapshot.memory
 
 
 def step_seconds(
@@ -147,10 +171,13 @@ class _TransientContact:
         surfaces: MovingSurfaces,
         options: Options,
         time_step: float,
+        viscosity_factor: Field | None,
+        *,
         flattening: bool,
     ) -> None:
         self.conditions, self.lubricant, self.surfaces = conditions, lubricant, surfaces
         self.options, self.flattening = options, flattening
+        self.viscosity_factor = viscosity_factor
         self.scales = Scales.from_conditions(conditions, lubricant)
         self.seconds = step_seconds(conditions, surfaces, time_step)
         self.length = self.seconds * conditions.entrainment_speed / self.scales.length
@@ -169,7 +196,14 @@ class _TransientContact:
         """Return the snapshot at time 0, from a steady contact (`steady`) or from rest."""
         surface = self.surfaces.composite_at(0.0)
         oil = self.lubricant if steady else None
-        solution = solve_contact(self.conditions, oil, surface, options=self.options, strict=False)
+        solution = solve_contact(
+            self.conditions,
+            oil,
+            surface,
+            options=self.options,
+            viscosity_factor=self.viscosity_factor,
+            strict=False,
+        )
         solution = replace(solution, lubricant=self.lubricant)
         approach = solution.rigid_approach / self.scales.gap
         pressure = solution.pressure / self.scales.pressure
@@ -206,6 +240,7 @@ class _TransientContact:
             seconds=time.perf_counter() - began,
             attempt=attempt,
         )
+        solution = replace(solution, viscosity_factor=self.viscosity_factor)
         balance = step.balance
         if self.one_line:
             across = full_problem.cells[1]
@@ -255,7 +290,12 @@ class _TransientContact:
 
     def _problem(self, surface: Surface, past: TransientTerm | None) -> Problem:
         steady_problem = contact_problem(
-            self.conditions, self.lubricant, surface, self.options, attempt=self.attempt
+            self.conditions,
+            self.lubricant,
+            surface,
+            self.options,
+            self.viscosity_factor,
+            attempt=self.attempt,
         )
         return replace(steady_problem, past=past)
 

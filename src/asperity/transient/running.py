@@ -47,8 +47,8 @@ class Series(NamedTuple):
 
     `values` has a row per step, the steady start first, and a column per number; `failed` counts
     steps that did not converge, `iterations` all Newton steps, `seconds` their time. `kept` are
-    some of the snapshots. Per passage, `zones` Hertz zones of roughness pass; those of the track
-    are `track_zones`.
+    the snapshots of the start and of the end of every passage. Per passage, `zones` Hertz zones of
+    roughness pass; those of the track are `track_zones`.
     """
 
     cells: tuple[int, int]
@@ -111,7 +111,7 @@ def run_track(
     *,
     passages: Callable[[], int] | None = None,
     options: Options | None = None,
-    keep: bool = False,
+    viscosity_factor: Field | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Series:
     """March a track through the contact, and return its series.
@@ -124,7 +124,7 @@ def run_track(
         default half as many more are added until the series of `clr` is stationary, at most
         `MAX_PASSAGES`
     options : solver settings; the tolerance is `TOLERANCE` or more
-    keep : keep the snapshots of the start and of the end of every passage
+    viscosity_factor : local over isothermal viscosity, (nx, ny)
     progress : called with the number of steps done and in total
 
     Raises
@@ -140,9 +140,14 @@ def run_track(
     per_passage = _steps_per_passage(conditions, surfaces, time_step)
     zones = _slowest_roughness(surfaces) / conditions.entrainment_speed
     length = min(MAX_PASSAGES, math.ceil(PASSAGES / min(1.0, max(zones, 0.1))))
-    record = _Record(measure, per_passage, length, keep=keep)
+    record = _Record(measure, per_passage, length)
     for snapshot in moving_contact(
-        conditions, lubricant, surfaces, time_step=time_step, options=options
+        conditions,
+        lubricant,
+        surfaces,
+        time_step=time_step,
+        options=options,
+        viscosity_factor=viscosity_factor,
     ):
         record.add(snapshot)
         if record.last_failed is not None and snapshot.number <= per_passage:
@@ -168,6 +173,7 @@ def solve_passage(
     surfaces: MovingSurfaces,
     *,
     options: Options | None = None,
+    viscosity_factor: Field | None = None,
 ) -> ContactSolution:
     """Return the running contact with its roughness at time 0, a passage after a steady start.
 
@@ -185,7 +191,12 @@ def solve_passage(
         steps = passages * per_passage
         earlier = surfaces.earlier(steps * step_seconds(conditions, surfaces, time_step))
         snapshots = moving_contact(
-            conditions, lubricant, earlier, time_step=time_step, options=options
+            conditions,
+            lubricant,
+            earlier,
+            time_step=time_step,
+            options=options,
+            viscosity_factor=viscosity_factor,
         )
         last = next(snapshots).solution
         if last.convergence.converged:
@@ -249,8 +260,8 @@ def _slowest_roughness(surfaces: MovingSurfaces) -> float:
 class _Record:
     """Numbers of the time steps so far, of `length` passages in all."""
 
-    def __init__(self, measure: Measure, per_passage: int, length: int, *, keep: bool) -> None:
-        self.measure, self.per_passage, self.length, self.keep = measure, per_passage, length, keep
+    def __init__(self, measure: Measure, per_passage: int, length: int) -> None:
+        self.measure, self.per_passage, self.length = measure, per_passage, length
         self.began, self.rows, self.names = (
             time.perf_counter(),
             list[list[float]](),
@@ -273,7 +284,7 @@ class _Record:
         if not convergence.converged:
             self.last_failed = snapshot.solution
         self.iterations += convergence.iterations
-        if self.keep and snapshot.number % self.per_passage == 0:
+        if snapshot.number % self.per_passage == 0:
             self.kept.append(replace(snapshot, memory={}))
 
     def series(self, cells: tuple[int, int]) -> Series:

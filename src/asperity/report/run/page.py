@@ -111,7 +111,8 @@ def render_page(runs: Sequence[Run], *, title: str | None = None) -> str:
         moment=_moment(runs),
         newtonian=any(oil is not None and isinstance(oil.rheology, Newtonian) for oil in oils),
         alone=_has_one_surface(runs),
-        isothermal=any(run.solution.lubricant and not run.case.thermal.feedback for run in runs),
+        isothermal=_is_isothermal(runs),
+        cold_inlet=_has_cold_inlet(runs),
         sphere=any(
             run.case.vibration and run.case.vibration.stiffness_law.point_spring for run in runs
         ),
@@ -119,6 +120,16 @@ def render_page(runs: Sequence[Run], *, title: str | None = None) -> str:
         ends=ends,
         oil_limits=_oil_limits(runs),
     )
+
+
+def _has_cold_inlet(runs: Sequence[Run]) -> bool:
+    """Return True if a lubricated contact is computed without inlet shear heating."""
+    return any(run.solution.lubricant and run.card.inlet_heating is None for run in runs)
+
+
+def _is_isothermal(runs: Sequence[Run]) -> bool:
+    """Return True if a lubricated contact is computed without thermal feedback."""
+    return any(run.solution.lubricant and not run.case.thermal.feedback for run in runs)
 
 
 def _moment(runs: Sequence[Run]) -> str | None:

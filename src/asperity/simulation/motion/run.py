@@ -9,13 +9,14 @@ from typing import NamedTuple
 from threadpoolctl import threadpool_limits
 
 from asperity.case import Case
-from asperity.core.arrays import usual_float_errors
+from asperity.core.arrays import Field, usual_float_errors
 from asperity.core.errors import BadInput, NotConverged
 from asperity.core.limits import require_affordable
 from asperity.core.notebook import notebook_progress
 from asperity.simulation.motion.history import History, steps_a_pass
 from asperity.simulation.motion.rows import Row, step_row
 from asperity.simulation.motion.store import open_recorder
+from asperity.solution import inlet_viscosity_factor
 from asperity.surface import MovingSurfaces
 from asperity.transient import Snapshot, Steps, moving_contact
 
@@ -86,11 +87,11 @@ def run_history(
                 case.conditions,
                 case.lubricant,
                 surfaces,
-                start=case.motion.start,
-                resume=recorder.memory,
+                start=recorder.memory or case.motion.start,
                 time_step=case.motion.time_step,
                 flattening=case.motion.flattening,
                 options=case.options,
+                viscosity_factor=_inlet(case, surfaces),
             )
             for snapshot in snapshots:
                 row = step_row(snapshot, case, recorder.rows[-1] if recorder.rows else None)
@@ -103,6 +104,11 @@ def run_history(
     if strict:
         _require_converged(history, last)
     return history
+
+
+def _inlet(case: Case, surfaces: MovingSurfaces) -> Field | None:
+    """Return the viscosity factor of inlet shear heating, if it is computed."""
+    return inlet_viscosity_factor(case.conditions, case.lubricant, surfaces.grid, case.thermal)
 
 
 def _require_converged(history: History, last: int) -> None:

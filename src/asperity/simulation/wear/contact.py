@@ -27,6 +27,7 @@ from asperity.solution import (
     contact_state,
     friction,
     friction_and_heat,
+    inlet_viscosity_factor,
     plastic_overlap,
     solve_thermal_contact,
 )
@@ -104,7 +105,15 @@ class PositionSolver:
     def _solved(self, surfaces: MovingSurfaces) -> ContactSolution:
         """Return the solution with running or with standing roughness."""
         if self.running and self.lubricant is not None and any(surfaces.rough):
-            return solve_passage(self.conditions, self.lubricant, surfaces, options=self.options)
+            return solve_passage(
+                self.conditions,
+                self.lubricant,
+                surfaces,
+                options=self.options,
+                viscosity_factor=inlet_viscosity_factor(
+                    self.conditions, self.lubricant, surfaces.grid, self.thermal
+                ),
+            )
         return self._standing(surfaces.composite_at(0.0))
 
     def _standing(self, surface: Surface) -> ContactSolution:
