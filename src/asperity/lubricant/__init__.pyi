@@ -5,9 +5,11 @@ from .density import DENSITY_LAWS as DENSITY_LAWS
 from .density import DensityLaw as DensityLaw
 from .density import DowsonHigginson as DowsonHigginson
 from .density import Incompressible as Incompressible
+from .density import Tait as Tait
 from .friction import FRICTION_LAWS as FRICTION_LAWS
 from .friction import ZERO_CELSIUS as ZERO_CELSIUS
 from .friction import BairWiner as BairWiner
+from .friction import CarreauShear as CarreauShear
 from .friction import EyringShear as EyringShear
 from .friction import FrictionLaw as FrictionLaw
 from .friction import LinearBairWiner as LinearBairWiner
@@ -30,6 +32,7 @@ from .pressure_viscosity import BaseOil as BaseOil
 from .pressure_viscosity import Estimator as Estimator
 from .pressure_viscosity import OilProperties as OilProperties
 from .rheology import RHEOLOGY_LAWS as RHEOLOGY_LAWS
+from .rheology import Carreau as Carreau
 from .rheology import Newtonian as Newtonian
 from .rheology import ReeEyring as ReeEyring
 from .rheology import RheologyLaw as RheologyLaw
@@ -41,8 +44,10 @@ from .thermal import Thermal as Thermal
 from .thermal import WarmthLaw as WarmthLaw
 from .viscosity import VISCOSITY_LAWS as VISCOSITY_LAWS
 from .viscosity import Barus as Barus
+from .viscosity import Doolittle as Doolittle
 from .viscosity import Roelands as Roelands
 from .viscosity import ViscosityLaw as ViscosityLaw
+from .viscosity import Yasutomi as Yasutomi
 from .viscosity import require_liquid as require_liquid
 from .walther import Walther as Walther
 from .walther import viscosity_100_of as viscosity_100_of

@@ -11,6 +11,7 @@ import numpy as np
 
 from asperity.core.arrays import Field
 from asperity.core.quantities import Parameter, Parametric
+from asperity.lubricant.rheology import Carreau, require_thinning
 
 ZERO_CELSIUS = 273.15  # 0 °C [K]
 
@@ -113,6 +114,32 @@ class LinearBairWiner(Parametric):
         return _stress_along_flow(film, *self.limits(film.pressure, film.temperature))
 
 
+@dataclass(frozen=True, slots=True)
+class CarreauShear(Parametric):
+    """Carreau's law τ = η γ' (1 + (η γ'/G)²)^((n - 1)/2), at most Λ p with a limit.
+
+    Source: as `rheology.Carreau`. Λ of hydrocarbons lies between 0.05 and 0.1.
+    """
+
+    stress: Annotated[float, Parameter("Pa", "G", "stress of shear thinning")]
+    n: Annotated[float, Parameter("", "n", "exponent n")]
+    limit: Annotated[float | None, Parameter("", "Λ", "limit of the stress over the pressure")] = (
+        None
+    )
+
+    def __post_init__(self) -> None:
+        Parametric.__post_init__(self)
+        require_thinning(self.n)
+
+    def __call__(self, film: ShearedFilm) -> Field:
+        """Return τ [Pa]."""
+        shear = film.viscosity * film.rate
+        stress = shear * Carreau(self.stress, self.n).thinning(shear)[0]
+        if self.limit is None:
+            return np.asarray(stress)
+        return np.minimum(stress, self.limit * np.maximum(film.pressure, 0.0))
+
+
 def _stress_along_flow(film: ShearedFilm, limit: Field, modulus: Field) -> Field:
     from asperity.kernels.shear_stress import march_shear_stress  # numba, for solved films only
 
@@ -125,5 +152,6 @@ FRICTION_LAWS: dict[str, type[FrictionLaw]] = {
     "bair-winer": BairWiner,
     "bair-winer-linear": LinearBairWiner,
     "ree-eyring": EyringShear,
+    "carreau": CarreauShear,
     "newtonian": NewtonianShear,
 }

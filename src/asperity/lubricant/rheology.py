@@ -6,6 +6,7 @@ from typing import Annotated, Protocol
 import numpy as np
 
 from asperity.core.arrays import Field
+from asperity.core.errors import BadInput
 from asperity.core.quantities import Parameter, Parametric
 
 
@@ -42,4 +43,37 @@ class ReeEyring(Parametric):
         return stress / ratio, ratio / (np.hypot(1.0, ratio) * stress) - 1.0
 
 
-RHEOLOGY_LAWS: dict[str, type[RheologyLaw]] = {"newtonian": Newtonian, "ree-eyring": ReeEyring}
+@dataclass(frozen=True, slots=True)
+class Carreau(Parametric):
+    """Carreau's law η* = η (1 + (η γ'/G)²)^((n - 1)/2) with γ' = Δu/h.
+
+    G is the stress at which shear thinning begins. Source: P. J. Carreau, Trans. Soc. Rheol. 16
+    (1972) 99, with stress as variable as in S. Bair, High-Pressure Rheology for Quantitative
+    Elastohydrodynamics (2007).
+    """
+
+    stress: Annotated[float, Parameter("Pa", "G", "stress of shear thinning")]
+    n: Annotated[float, Parameter("", "n", "exponent n")]
+
+    def __post_init__(self) -> None:
+        Parametric.__post_init__(self)
+        require_thinning(self.n)
+
+    def thinning(self, shear: Field) -> tuple[Field, Field]:
+        """Return (1 + S²)^((n - 1)/2) and (n - 1) S²/(1 + S²), S = η γ'/G."""
+        squared = (shear / self.stress) ** 2
+        power = self.n - 1.0
+        return (1.0 + squared) ** (0.5 * power), power * squared / (1.0 + squared)
+
+
+def require_thinning(n: float) -> None:
+    """Raise BadInput for an exponent of Carreau's law above 1."""
+    if n > 1.0:
+        raise BadInput(f"n of Carreau's law must be at most 1, got {n:g}; 1 is Newtonian")
+
+
+RHEOLOGY_LAWS: dict[str, type[RheologyLaw]] = {
+    "newtonian": Newtonian,
+    "ree-eyring": ReeEyring,
+    "carreau": Carreau,
+}
