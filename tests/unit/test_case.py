@@ -189,7 +189,8 @@ BAD = [
     (
         "lubricant.viscosity.law",
         "baruss",
-        'viscosity.law must be one of barus, roelands, doolittle, yasutomi, got "baruss"; did you mean "barus"?',
+        "viscosity.law must be one of barus, roelands, doolittle, yasutomi, "
+        'got "baruss"; did you mean "barus"?',
     ),
     ("lubricant.viscosity.p0", "1 MPa", "lubricant.viscosity.p0 is not a known key"),
     ("surface.kind", "gausian", 'did you mean "gaussian"?'),

@@ -23,7 +23,15 @@ from asperity.lubricant import (
     Thermal,
 )
 from asperity.results import solve_case
-from asperity.solution import heats_inlet, inlet, inlet_heating, inlet_viscosity_factor
+from asperity.solution import (
+    friction,
+    friction_and_heat,
+    heats_inlet,
+    inlet,
+    inlet_heating,
+    inlet_viscosity_factor,
+    solve_thermal_contact,
+)
 from asperity.solution.film_transport import FilmTransport
 from asperity.solution.inlet import HEAT_CAPACITY
 from asperity.surface import flat_surface
@@ -116,6 +124,52 @@ def test_the_heat_is_the_power_of_the_flow():
     assert heat.generated_w == pytest.approx(power, rel=0.03)
 
 
+def test_sliding_adds_its_power_before_the_hertz_zone():
+    """The sum of τ Δu there; with thermal feedback it belongs to the temperature of the film."""
+    contacts = [rolling(0.1, slip=slip) for slip in (0.0, 0.5)]
+    grid = grid_of(contacts[0])
+    without, with_sliding = (inlet_heating(contact, OIL, grid, THERMAL) for contact in contacts)
+    fed = inlet_heating(contacts[1], OIL, grid, replace(THERMAL, feedback=True))
+    solution = solve_contact(contacts[1], OIL, flat_surface(without.grid))
+    before = without.grid.x < -contacts[1].hertz.half_widths[0]
+    stress = np.abs(friction(solution, thermal=THERMAL).shear[before, 0])
+    speed = contacts[1].sliding_speed
+    power = stress.sum() * speed * without.grid.spacing[0] * contacts[1].length
+    assert power > 0.05 * without.generated_w
+    added = with_sliding.generated_w - without.generated_w
+    assert added == pytest.approx(power, rel=0.1)
+    assert fed.generated_w == pytest.approx(without.generated_w, rel=0.02)
+
+
+def test_with_feedback_the_inlet_is_that_of_oil_at_the_temperature_of_the_bodies():
+    """The film of warm bodies is that of a warm supply, with or without inlet shear heating."""
+    conditions = rolling(0.5)
+    grid, warm = grid_of(conditions), 40.0
+    bulk = (THERMAL.ambient + warm,) * 2
+    fed = replace(THERMAL, feedback=True, bulk=bulk)
+    supplied = replace(OIL, viscosity=Barus(0.1 * math.exp(-BETA * warm), 20e-9))
+    found = inlet_heating(conditions, OIL, grid, fed).film_factor
+    expected = inlet_heating(conditions, supplied, grid, THERMAL).film_factor
+    assert found == pytest.approx(expected, abs=2e-3)
+    assert inlet_heating(conditions, OIL, grid, THERMAL).film_factor < expected - 0.05
+
+
+def test_friction_keeps_the_warm_inlet_beside_a_film_temperature():
+    conditions = rolling(0.5, slip=0.02)
+    surface = flat_surface(grid_of(conditions))
+    heated = solve_thermal_contact(
+        conditions, OIL, surface, thermal=replace(THERMAL, inlet_heating=True)
+    )
+    below = [
+        friction_and_heat(heated, thermal=replace(THERMAL, inlet_heating=flag))[0].heat_below
+        for flag in (True, False)
+    ]
+    cold = solve_contact(conditions, OIL, surface)
+    reference = friction_and_heat(cold, thermal=THERMAL)[0].heat_below
+    assert below[0] == pytest.approx(reference, rel=0.3)
+    assert below[1] < 0.97 * below[0]
+
+
 def test_slow_contacts_keep_their_film():
     """The loss is proportional to L at small L, and vanishes with the speed."""
     losses = []
@@ -145,14 +199,14 @@ def test_sliding_and_warm_surfaces_thin_the_film_further():
     disc = inlet_heating(conditions, OIL, grid, replace(THERMAL, solids=(STEEL, glass))).film_factor
     sliding = inlet_heating(rolling(0.3, slip=0.5), OIL, grid, THERMAL).film_factor
     assert 1.0 > cold > steel > disc
-    assert steel > sliding
+    assert 1.0 - sliding > 1.08 * (1.0 - steel)  # without heat of sliding 1.01 times
     thinning = replace(OIL, rheology=ReeEyring(1e5))
     assert inlet_heating(rolling(0.3, slip=0.5), thinning, grid, THERMAL).film_factor > sliding
 
 
 def test_published_fits_are_of_the_same_size():
-    """Fit of Gupta et al. for steel: twice the solved loss at small L, 1.3 times it at L = 2."""
-    for loading, least, most in ((0.1, 0.45, 0.75), (2.0, 0.7, 1.1)):
+    """Fit of Gupta et al. for steel: twice the solved loss at small L, 1.1 times it at L = 2."""
+    for loading, least, most in ((0.1, 0.45, 0.75), (2.0, 0.8, 1.0)):
         conditions = rolling(loading, load=5000.0)
         solved = inlet_heating(conditions, OIL, grid_of(conditions), THERMAL).film_factor
         fit = inlet_heating_factor(conditions, OIL, THERMAL)

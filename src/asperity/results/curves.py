@@ -15,7 +15,7 @@ from asperity.core.quantities import quantity
 from asperity.ehl import Iteration
 from asperity.results.run import Run
 from asperity.results.solve import solve_case
-from asperity.solution import HOT
+from asperity.solution import HOT, heats_inlet
 
 SolverProgress = Callable[[Iteration], None]
 FrictionCurveKind = Literal["stribeck", "traction"]
@@ -193,10 +193,11 @@ def _curve(
     if not points:
         raise BadInput("a curve needs at least one point, got none")
     case = case.among_many.with_written({"vibration": "none", "solver.surfaces": 1})
-    runs = (
-        solve_case(case.with_written(point), strict=False, groups=GROUPS, progress=progress)
-        for point in points
-    )
+    cases = [case.with_written(point) for point in points]
+    if any(heats_inlet(at.conditions, at.lubricant, at.thermal) for at in cases):
+        # at every point, so that the curve has no step
+        cases = [at.with_written({"thermal.inlet_heating": True}) for at in cases]
+    runs = (solve_case(at, strict=False, groups=GROUPS, progress=progress) for at in cases)
     return FrictionCurve(
         kind=kind,
         points=tuple(map(_point, runs)),

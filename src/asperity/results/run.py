@@ -43,10 +43,10 @@ from asperity.solution import (
     axial_distribution,
     clr_below,
     friction_and_heat,
-    heated_inlet,
     own_resonance,
     regime_card,
     sharing_by_film,
+    solved_inlet,
     subsurface_stress,
     uncertain_films,
     undetermined,
@@ -275,8 +275,7 @@ class Run(Displayed):
     def card(self) -> RegimeCard:
         """Regime card: kind of contact, and comparison with published film formulas."""
         solution, thermal = self.solution, self.case.thermal
-        contact = solution.conditions, solution.lubricant, solution.grid
-        card = regime_card(solution, thermal, heated_inlet(*contact, thermal))
+        card = regime_card(solution, thermal, solved_inlet(solution, thermal))
         if self.running is None:
             return card
         slope = self.state.rms_slope

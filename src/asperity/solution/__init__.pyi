@@ -9,10 +9,10 @@ from .ends import axial_distribution as axial_distribution
 from .flash import FlashTemperature as FlashTemperature
 from .flash import flash_temperature as flash_temperature
 from .inlet import InletHeating as InletHeating
-from .inlet import heated_inlet as heated_inlet
 from .inlet import heats_inlet as heats_inlet
 from .inlet import inlet_heating as inlet_heating
 from .inlet import inlet_viscosity_factor as inlet_viscosity_factor
+from .inlet import solved_inlet as solved_inlet
 from .load_sharing import FILMS as FILMS
 from .load_sharing import LoadSharing as LoadSharing
 from .load_sharing import clr_below as clr_below

@@ -14,7 +14,8 @@ with the mean temperature T_w of both surfaces. The profile of θ across the fil
 sliding and compression, heated evenly, and of fourth degree for flow, which heats next to the
 surfaces: they conduct G = 12 k/h and 20 k/h, and carry E = u h + 1.2 Q and u h + 8/7 Q. Surfaces
 warm by the flow of heat G θ, as in `flash`. Flow under pressure depends on the fluidity near the
-surfaces: the viscosity for Reynolds' equation is 1/(24 int_0^½ ζ²/η dζ), ζ = z/h.
+surfaces: the viscosity for Reynolds' equation is 1/(24 int_0^½ ζ²/η dζ), ζ = z/h. Bulk temperatures
+and the heat of sliding belong to `thermal` where feedback is on.
 
 The inlet of the smooth bodies is solved, on a coarser grid: roughness hardly changes a film that is
 several times thicker. Sources of the theory: J. A. Greenwood, J. J. Kauzlarich, J. Lubr. Technol.
@@ -52,6 +53,7 @@ from asperity.solution.traction import friction
 from asperity.surface import flat_surface
 
 MATTERS = 0.9  # published factor below which inlet shear heating is computed by default
+NEGLIGIBLE = 0.998  # above it the film changes by less than 0.1 %
 HEAT_CAPACITY = 2000.0  # of mineral oils at 40 °C [J/kg/K]; 10 % of it move a film by 0.05 %
 CONVERGED = 1e-5  # of the film: pressures are small where the oil warms
 AHEAD, BEHIND, BESIDE = 12.0, 2.5, 6.0  # most extent of the grid, in lengths of the loaded zone
@@ -70,8 +72,8 @@ _NODES, _WEIGHTS = 0.25 * (_ROOTS + 1.0), 0.25 * _SHARES  # across half of the f
 class InletHeating:
     """Inlet shear heating of a contact of smooth bodies, on a coarse grid.
 
-    `rise` is the mean temperature of the film above ambient [K], `viscosity_factor` the viscosity
-    for Reynolds' equation over that at ambient temperature; both (nx, ny) on `grid`. `film_factor`
+    `rise` is the mean rise of the film's temperature [K], `viscosity_factor` the viscosity for
+    Reynolds' equation over that without heat; both (nx, ny) on `grid`. `film_factor`
     is the central film over the isothermal one. `max_k` is the largest rise [K]; `generated_w` the
     heat generated [W], `walls_w` its part that flows into the bodies, and `carried_w` that which
     the oil carries away; of a line contact over its length.
@@ -111,22 +113,13 @@ def heats_inlet(
 ) -> bool:
     """Return True if inlet shear heating is computed: as stated, or else where it matters.
 
-    It matters where the published factor on the film is below `MATTERS`.
+    It matters where the published factor on the film is below `MATTERS`; it is never computed where
+    that is above `NEGLIGIBLE`.
     """
-    if lubricant is None or conditions.entrainment_speed == 0.0:
+    if lubricant is None or thermal.inlet_heating is False:
         return False
-    if thermal.inlet_heating is not None:
-        return thermal.inlet_heating
-    return inlet_heating_factor(conditions, lubricant, thermal) < MATTERS
-
-
-def heated_inlet(
-    conditions: ContactConditions, lubricant: Lubricant | None, grid: Grid, thermal: Thermal
-) -> InletHeating | None:
-    """Return inlet shear heating where `heats_inlet`, else None; raises as `inlet_heating`."""
-    if lubricant is None or not heats_inlet(conditions, lubricant, thermal):
-        return None
-    return inlet_heating(conditions, lubricant, grid, thermal)
+    fit = inlet_heating_factor(conditions, lubricant, thermal)
+    return fit < (MATTERS if thermal.inlet_heating is None else NEGLIGIBLE)
 
 
 def inlet_viscosity_factor(
@@ -136,8 +129,22 @@ def inlet_viscosity_factor(
 
     Raises as `inlet_heating`.
     """
-    heat = heated_inlet(conditions, lubricant, grid, thermal)
-    return None if heat is None else heat.factor_on(grid)
+    if lubricant is None or not heats_inlet(conditions, lubricant, thermal):
+        return None
+    return inlet_heating(conditions, lubricant, grid, thermal).factor_on(grid)
+
+
+def solved_inlet(solution: ContactSolution, thermal: Thermal) -> InletHeating | None:
+    """Return the inlet shear heating that a solution includes, None if it has none.
+
+    Raises as `inlet_heating`.
+    """
+    conditions, lubricant = solution.conditions, solution.lubricant
+    if lubricant is None or solution.viscosity_factor is None:
+        return None
+    if not heats_inlet(conditions, lubricant, thermal):
+        return None
+    return inlet_heating(conditions, lubricant, solution.grid, thermal)
 
 
 @lru_cache(maxsize=8)
@@ -170,9 +177,13 @@ def _solved(
         flat_surface(_coarser(grid, conditions, lubricant)),
         Options(tolerance=CONVERGED),
     )
-    cold = solution = solve_contact(conditions, lubricant, surface, options=options)
     mixer = Mixer()
     log_factor: Field = np.zeros(surface.grid.cells)
+    eta0 = np.full(surface.grid.cells, lubricant.viscosity.eta0)
+    base = thermal.warmth.factor(eta0, _base_temperature(thermal) + 0.0 * eta0, thermal.ambient)
+    cold = solution = solve_contact(
+        conditions, lubricant, surface, options=options, viscosity_factor=base
+    )
     for _ in range(MAX_SOLVES):
         heat = _Inlet(solution, thermal).heat()
         change = np.clip(np.log(heat.viscosity_factor) - log_factor, -MOST_CHANGE, MOST_CHANGE)
@@ -185,12 +196,20 @@ def _solved(
             surface,
             options=options,
             start=solution,
-            viscosity_factor=np.exp(log_factor),
+            viscosity_factor=base * np.exp(log_factor),
         )
     raise AsperityError(
         "inlet shear heating did not converge; set thermal.inlet_heating=false to compute the film "
         "without it"
     )
+
+
+def _base_temperature(thermal: Thermal) -> float:
+    """Return the temperature that the inlet heats up from [K].
+
+    With feedback, that of the bodies is part of the film's temperature.
+    """
+    return thermal.ambient + (sum(thermal.bulk_rise) / 2.0 if thermal.feedback else 0.0)
 
 
 def _log_mean(first: Field, second: Field) -> Field:
@@ -260,8 +279,10 @@ class _Inlet:
         ahead = self.grid.x[:, None] < 0.0
         backward = 0.5 * (along[1:] + along[:-1] + across[:, 1:] + across[:, :-1]) * ahead
         before = self._before_zone()
-        stress = np.abs(friction(solution, thermal=thermal).shear)
-        sliding = stress * solution.conditions.sliding_speed * before
+        sliding: Field = np.zeros(self.grid.cells)
+        if not thermal.feedback:  # otherwise in the temperature of the film
+            stress = np.abs(friction(solution, thermal=thermal).shear)
+            sliding = stress * solution.conditions.sliding_speed * before
         carried = self.speed * solution.gap * 0.5 * (slopes[0][1:] + slopes[0][:-1])
         compression = thermal.ambient * EXPANSION / self.density * (carried - backward) * before
         total = backward + sliding + np.abs(compression)
@@ -355,14 +376,16 @@ class _Inlet:
         return FilmTransport(self.grid, along + self.capacity[0] * self.carried[0], across)
 
     def _factor(self, wall: Field, excess: Field) -> Field:
-        """Return the viscosity for flow under pressure over that at ambient temperature."""
+        """Return the viscosity for flow under pressure over that without heat."""
         thermal, share = self.thermal, self.backward_share
+        base: Field = np.full(self.grid.cells, _base_temperature(thermal))
+        cold = thermal.warmth.factor(self.cold, base, thermal.ambient)
         fluidity: Field = np.zeros(self.grid.cells)
         for node, weight in zip(_NODES, _WEIGHTS, strict=True):
             profile = share * 1.25 * (1.0 - 16.0 * node**4) + (1.0 - share) * 1.5 * (
                 1.0 - 4.0 * node**2
             )
-            here = thermal.ambient + wall + profile * excess
+            here = base + wall + profile * excess
             factor = thermal.warmth.factor(self.cold, here, thermal.ambient)
             fluidity += 24.0 * weight * node**2 / factor
-        return 1.0 / fluidity
+        return 1.0 / (cold * fluidity)

@@ -50,6 +50,7 @@ def friction_and_heat(
         heat = flash_temperature(solution, cold, thermal=thermal)
         return _with_heat_below(solution, cold, heat, thermal), heat
     rise: Field = np.zeros(solution.grid.cells)
+    inlet_factor = _inlet_factor(solution, thermal)
     mixer = Mixer()
     for _ in range(MAX_ROUNDS):
         friction_result = friction(
@@ -57,6 +58,7 @@ def friction_and_heat(
             boundary_friction=boundary_friction,
             thermal=thermal,
             film_temperature=thermal.ambient + rise,
+            inlet_factor=inlet_factor,
         )
         heat = flash_temperature(solution, friction_result, thermal=thermal)
         change = heat.film - rise
@@ -86,8 +88,18 @@ def _with_heat_below(
         boundary_friction=cold.boundary_friction,
         thermal=thermal,
         film_temperature=thermal.ambient + np.maximum(heat.film, 0.0),
+        inlet_factor=_inlet_factor(solution, thermal),
     )
     return replace(cold, heat_below=max(cold.oil_part - warm.oil_part, 0.0))
+
+
+def _inlet_factor(solution: ContactSolution, thermal: Thermal) -> Field | float:
+    """Return the viscosity factor of inlet shear heating of a solution, 1 without."""
+    if solution.viscosity_factor is None:
+        return 1.0
+    conditions, lubricant = solution.conditions, solution.lubricant
+    factor = inlet_viscosity_factor(conditions, lubricant, solution.grid, thermal)
+    return 1.0 if factor is None else factor
 
 
 class SolveSettings(TypedDict, total=False):

@@ -69,6 +69,7 @@ def friction(
     boundary_friction: float = BOUNDARY_FRICTION,
     thermal: Thermal | None = None,
     film_temperature: Field | None = None,
+    inlet_factor: Field | float = 1.0,
 ) -> Friction:
     """Compute the friction of a solved contact.
 
@@ -78,6 +79,7 @@ def friction(
     thermal : ambient temperature and viscosity-temperature law; default `Thermal()`
     film_temperature : mean over the film's thickness, (nx, ny) [K]; default ambient, with the
         viscosity of the solution
+    inlet_factor : viscosity factor of inlet shear heating, beside a film temperature
 
     Raises
     ------
@@ -92,7 +94,7 @@ def friction(
     pressure_sum = float(solution.pressure.sum())
     below = above = 0.0
     if sliding != 0.0:
-        if (film := _sheared_film(solution, thermal, film_temperature)) is not None:
+        if (film := _sheared_film(solution, thermal, film_temperature, inlet_factor)) is not None:
             stress = _oil_stress(solution, film)
             below, above = (side / pressure_sum for side in _oil_error(solution, film))
         stress[solution.in_contact] = boundary_friction * solution.pressure[solution.in_contact]
@@ -138,7 +140,10 @@ def _check(
 
 
 def _sheared_film(
-    solution: ContactSolution, thermal: Thermal, film_temperature: Field | None
+    solution: ContactSolution,
+    thermal: Thermal,
+    film_temperature: Field | None,
+    inlet_factor: Field | float,
 ) -> ShearedFilm | None:
     """Return the sheared film, None for a dry contact."""
     oil = solution.lubricant
@@ -147,7 +152,7 @@ def _sheared_film(
         return None
     viscosity = oil.viscosity(solution.pressure)
     if film_temperature is not None:
-        viscosity = viscosity * warm_factor(solution, thermal, film_temperature)
+        viscosity = viscosity * inlet_factor * warm_factor(solution, thermal, film_temperature)
     elif solution.viscosity_factor is not None:
         viscosity = viscosity * solution.viscosity_factor
     ambient: Field = np.full(solution.grid.cells, thermal.ambient)

@@ -27,10 +27,10 @@ from asperity.coupling import (
     band_about,
     contact_vibration,
 )
-from asperity.ehl import ContactSolution, Scales, solve_contact
+from asperity.ehl import ContactSolution, Scales
 from asperity.resonance import FEWEST_LINES, Resonance, contact_resonance, no_resonance
 from asperity.simulation.motion.history import History
-from asperity.solution import OscillatingContact, tangent_stiffness
+from asperity.solution import OscillatingContact, solve_thermal_contact, tangent_stiffness
 from asperity.surface import MovingSurfaces
 from asperity.vibration import ContactOscillator, acceleration
 
@@ -357,10 +357,11 @@ def _moments(
     failure = ""
     for number, time in zip(rows["step"].iloc[indices], rows["time_s"].iloc[indices], strict=True):
         try:
-            contact = solve_contact(
+            contact = solve_thermal_contact(
                 case.conditions,
                 case.lubricant,
                 surfaces.composite_at(float(time)),
+                thermal=case.thermal,
                 options=case.options,
             )
             stiffness.append(
