@@ -326,7 +326,7 @@ def _compute(experiment: Experiment, case: Case) -> tuple[ComparedPoint, ...]:
     points = []
     for point in experiment.points:
         at_point = case.with_overrides(point.conditions)
-        numbers = solve_case(at_point).summary()
+        numbers = solve_case(at_point).scalars()
         value = cast(float, numbers[experiment.key])
         error = cast(float, numbers.get(quantity(experiment.key).deviation) or 0.0)
         low, high = None, None
@@ -361,7 +361,7 @@ def _without_heat(
             compared,
             isothermal=cast(
                 float,
-                solve_case(cold.with_overrides(point.conditions)).summary()[experiment.key],
+                solve_case(cold.with_overrides(point.conditions)).scalars()[experiment.key],
             ),
         )
         for compared, point in zip(points, experiment.points, strict=True)
@@ -381,7 +381,7 @@ def _alpha_effect(experiment: Experiment, case: Case) -> tuple[float, float] | N
         middle.lubricant.alpha_error,
     )
     low, value, high = (
-        cast(float, solve_case(one_case).summary()[experiment.key])
+        cast(float, solve_case(one_case).scalars()[experiment.key])
         for one_case in (
             middle.with_overrides({ALPHA: (1.0 - error) * alpha}),
             middle,

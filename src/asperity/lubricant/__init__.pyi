@@ -21,6 +21,7 @@ from .laws import law_name as law_name
 from .laws import make_law as make_law
 from .measured import MeasuredOil as MeasuredOil
 from .measured import measured_oils as measured_oils
+from .model import STATED_ALPHA_ERROR as STATED_ALPHA_ERROR
 from .model import Lubricant as Lubricant
 from .model import describe_lubricant as describe_lubricant
 from .model import make_lubricant as make_lubricant

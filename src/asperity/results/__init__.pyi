@@ -13,6 +13,7 @@ from .friction_interval import FrictionInterval as FrictionInterval
 from .lubrication_regime import BOUNDARY_FROM as BOUNDARY_FROM
 from .lubrication_regime import FULL_FILM_BELOW as FULL_FILM_BELOW
 from .lubrication_regime import lubrication as lubrication
+from .oil_effect import AlphaEffect as AlphaEffect
 from .roughness_levels import levels_verdict as levels_verdict
 from .roughness_levels import not_converged as not_converged
 from .run import ENDS as ENDS

@@ -25,6 +25,7 @@ from asperity.results.friction_interval import (
     numerical_error,
 )
 from asperity.results.lubrication_regime import lubrication
+from asperity.results.oil_effect import AlphaEffect, alpha_effect, oil_summary
 from asperity.results.run_contents import run_contents
 from asperity.results.running import Running
 from asperity.results.surface_spread import AVERAGED, Row, Scalar, half_interval, mean_row
@@ -272,6 +273,11 @@ class Run(Displayed):
         return means | read(self, lines(UNCERTAINTY, RUNNING))
 
     @cached_property
+    def alpha_effect(self) -> AlphaEffect | None:
+        """Effect of an estimated alpha on film and load share."""
+        return alpha_effect(self.case, self.solution)
+
+    @cached_property
     def card(self) -> RegimeCard:
         """Regime card: kind of contact, and comparison with published film formulas."""
         solution, thermal = self.solution, self.case.thermal
@@ -339,20 +345,13 @@ class Run(Displayed):
         return self.state.clr if self.running is None else self.running.snapshot_clr
 
     def summary(self) -> dict[str, object]:
-        """Return the content of `solve --json`: numbers, cells, regime card and notes.
-
-        For an oil from a data sheet, its numbers are under `oil`, with the `origins` of each.
-        """
-        facts = self.case.oil_facts
-        origins = {fact.key: ": ".join(filter(None, (fact.origin, fact.how))) for fact in facts}
-        values: dict[str, object] = {fact.key: fact.value for fact in facts}
-        oil: dict[str, object] = {"oil": {**values, "origins": origins}} if facts else {}
+        """Return the content of `solve --json`: numbers, cells, regime card, oil and notes."""
         return {
             **self.scalars(),
             "roughness": "standing" if self.running is None else "running",
             "cells": list(self.solution.grid.cells),
             "regime_card": self.card.to_dict(),
-            **oil,
+            **oil_summary(self.case, self.alpha_effect, self.state),
             **(
                 {}
                 if self.dynamic_curve is None

@@ -122,6 +122,11 @@ def render_page(runs: Sequence[Run], *, title: str | None = None) -> str:
     )
 
 
+def _alpha_notes(run: Run) -> list[str]:
+    """Return the effect of an estimated pressure-viscosity coefficient as a note."""
+    return [] if run.alpha_effect is None else [run.alpha_effect.note(run.state)]
+
+
 def _has_cold_inlet(runs: Sequence[Run]) -> bool:
     """Return True if a lubricated contact is computed without inlet shear heating."""
     return any(run.solution.lubricant and run.card.inlet_heating is None for run in runs)
@@ -196,7 +201,7 @@ def _view(run: Run, number: int, numbered: bool) -> _RunView:
         pictures=pictures[:shown],
         more_pictures=pictures[shown:],
         uncertainties=uncertainty_rows(run.error, run.friction_interval),
-        notes=[*run.remarks, *_missing_exhibits(run)],
+        notes=[*run.remarks, *_alpha_notes(run), *_missing_exhibits(run)],
     )
 
 
