@@ -14,3 +14,6 @@ from .run import BenchmarkRow as BenchmarkRow
 from .run import run_benchmark as run_benchmark
 from .solver import Solver as Solver
 from .solver import solver_named as solver_named
+from .tribometer import TribometerStep as TribometerStep
+from .tribometer import TribometerTest as TribometerTest
+from .tribometer import read_tribometer as read_tribometer

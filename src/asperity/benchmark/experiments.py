@@ -14,6 +14,7 @@ from typing import cast
 import numpy as np
 import pandas
 
+from asperity.benchmark.tribometer import read_tribometer
 from asperity.case import Case, load_case
 from asperity.core import files
 from asperity.core.errors import AsperityError, BadInput
@@ -233,7 +234,9 @@ def _read(path: Path) -> Experiment:
     try:
         content = tomllib.loads(path.read_text("utf-8"))
         case = load_case(content.pop("case"))
-        columns, rows = content.pop("columns"), content.pop("points")
+        columns = content.pop("columns")
+        export = content.pop("export", None)
+        rows = content.pop("points") if export is None else _exported(path, export)
         if not rows:
             raise ValueError("points is empty")
         return Experiment(
@@ -254,6 +257,23 @@ def _read(path: Path) -> Experiment:
         raise BadInput(
             f"{path} is not a set of measurements: {error!r}; compare it with those of asperity"
         ) from None
+
+
+def _exported(path: Path, export: Mapping[str, object]) -> list[list[float]]:
+    """Return the rows of a tribometer's export beside a set, without incomplete ones.
+
+    `export` states its `file`, the `columns` in the order of the set's, and perhaps the `steps`.
+    """
+    test = read_tribometer(path.parent / str(export["file"]))
+    columns, steps = cast(list[str], export["columns"]), export.get("steps")
+    tables = [
+        step.table for step in test.steps if steps is None or step.number in cast(list[int], steps)
+    ]
+    rows: list[list[float]] = []
+    for table in tables:
+        if set(columns) <= set(table.columns):
+            rows += table[columns].dropna().to_numpy(float).tolist()
+    return rows
 
 
 def _point(columns: list[str], row: list[float]) -> MeasuredPoint:
