@@ -94,7 +94,7 @@ def test_measured_films_agree_as_well_as_with_the_published_simulation(films):
 
 
 def test_measured_films_before_the_dimple_agree(films):
-    """Means from 60 µm upstream of the dimple on: 1.4 % in pure rolling, 3 and 5.4 % at half speed."""
+    """Means from 60 µm upstream of the dimple on: 2 % in pure rolling, 5.4 % at half speed."""
     name, a, x, found = films
     compared = 0
     for number in range(1, 6):
@@ -109,4 +109,4 @@ def test_measured_films_before_the_dimple_agree(films):
         limit = 0.02 if name == "ssr0" else 0.06
         assert computed == pytest.approx(measured[before].mean(), rel=limit), number
         compared += 1
-    assert compared == 2
+    assert compared >= 2
