@@ -57,8 +57,8 @@ NEGLIGIBLE = 0.998  # above it the film changes by less than 0.1 %
 HEAT_CAPACITY = 2000.0  # of mineral oils at 40 °C [J/kg/K]; 10 % of it move a film by 0.05 %
 CONVERGED = 1e-5  # of the film: pressures are small where the oil warms
 AHEAD, BEHIND, BESIDE = 12.0, 2.5, 6.0  # most extent of the grid, in lengths of the loaded zone
-# cells of the grid, where the contact's own has as many; they move the film by 0.4 %
-LEAST_CELLS, MOST_CELLS, CELLS_A_LENGTH = 72, 96, 8.0
+# cells of the grid, where the contact's own has as many; they move the film by 0.3 %
+LEAST_CELLS, MOST_CELLS, CELLS_A_LENGTH = 48, 96, 6.0
 TOLERANCE = 5e-3  # change of the logarithm of viscosity
 MAX_SOLVES, MOST_CHANGE = 30, 1.0  # in number, and of the same in each
 WALL_TOLERANCE = 1e-4  # change of the surfaces' temperature over the largest rise
