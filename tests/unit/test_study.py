@@ -30,6 +30,7 @@ from asperity.study import (
     plan_study,
     run_study,
 )
+from asperity.study.evaluate import case_at
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 DRY = {
@@ -486,3 +487,17 @@ def test_swept_pairs_tables_and_mixed_values_become_text_columns(
     assert list(pandas.read_parquet(tmp_path / "table.parquet")[key]) == written
     assert list(load_study(tmp_path).table[key]) == written
     assert not result.failed
+
+
+def test_inlet_shear_heating_is_computed_at_every_point_or_at_none():
+    """As the base case needs it, so that no step of the film lies between two points."""
+    paper = load_case(EXAMPLES / "paper.toml")
+    slow = paper.with_overrides({"contact.entrainment_speed": "1 m/s"})
+    fast = paper.with_overrides({"contact.entrainment_speed": "8 m/s"})
+    speeds = ({"contact.entrainment_speed": f"{speed} m/s"} for speed in (1, 8))
+    for point in speeds:
+        assert case_at(slow, point).thermal.inlet_heating is False
+        assert case_at(fast, point).thermal.inlet_heating is True
+    stated = slow.with_overrides({"thermal.inlet_heating": True})
+    assert case_at(stated, {}).thermal.inlet_heating is True
+    assert case_at(slow, {"thermal.inlet_heating": True}).thermal.inlet_heating is True

@@ -19,6 +19,7 @@ from asperity.core.documents import Table
 from asperity.core.errors import AsperityError
 from asperity.coupling import Vibration, contact_vibration
 from asperity.results import RUN_GROUPS, Run, solve_case, vibrate_case
+from asperity.solution import heats_inlet
 
 CaseStatus = Literal["done", "not converged", "failed"]
 StudyField = Literal["pressure", "gap", "in_contact", "surface_height"]
@@ -60,12 +61,24 @@ def evaluate(
 ) -> tuple[Row, dict[str, Field]]:
     """Return the row of one case: `status`, `reason` and every scalar, and the requested fields."""
     try:
-        return EVALUATIONS[kind](case.with_written(overrides).among_many, fields)
+        return EVALUATIONS[kind](case_at(case, overrides), fields)
     except AsperityError as refusal:
         return {"status": FAILED, "reason": str(refusal)}, {}
     except Exception as error:  # an internal error must not lose the other cases
         logging.getLogger(__name__).exception("a case of a study failed: %s", overrides)
         return {"status": FAILED, "reason": f"{type(error).__name__}: {error}"}, {}
+
+
+def case_at(case: Case, overrides: Table) -> Case:
+    """Return the case of a study's point.
+
+    The base case decides whether inlet shear heating matters, at all points alike: the film has a
+    step where it begins.
+    """
+    if case.lubricant is None or case.thermal.inlet_heating is not None:
+        return case.with_written(overrides).among_many
+    heated = heats_inlet(case.conditions, case.lubricant, case.thermal)
+    return case.with_written({"thermal.inlet_heating": heated, **overrides}).among_many
 
 
 def _solve(

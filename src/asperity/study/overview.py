@@ -23,7 +23,7 @@ from asperity.paper import (
 from asperity.results import Run, solve_case
 from asperity.study.axes import SweptAxis, swept_axis, varying_outputs
 from asperity.study.curve import SQ_KEY, WearCurve, curve_from_study, is_wear_study
-from asperity.study.evaluate import BOTH_PRESETS, DONE
+from asperity.study.evaluate import BOTH_PRESETS, DONE, case_at
 from asperity.study.execute import StudyResult
 from asperity.study.plan import SEED_KEYS, as_written
 
@@ -152,7 +152,7 @@ class StudyOverview:
                 self.progress(f"map {count} of {len(self.mapped)}")
             try:
                 overrides = self.result.plan.cases[number].overrides
-                case = self.result.plan.case.with_written(overrides).among_many
+                case = case_at(self.result.plan.case, overrides)
                 with threadpool_limits(1):  # as in the study, for bit-identical results
                     runs.append(solve_case(case, strict=False))
             except AsperityError as refusal:
