@@ -68,7 +68,8 @@ def basis(stored: dict[str, Any]) -> str:
     return (
         f"asperity {stored['version']} solved {len(stored['contacts'])} contacts: a steel line "
         "contact of 5.4 mm effective radius and 10 mm length with mineral oil, slip 0.2, a "
-        "flooded inlet and a hardness of 2 GPa. Each is a snapshot: the roughness is held still. "
+        "flooded inlet, inlet shear heating and a hardness of 2 GPa. Each is a snapshot: the "
+        "roughness is held still. "
         "Roughness that moves with its body usually carries more of the load; asperity solve "
         "reports that mean over time. All contacts have the same isotropic Gaussian surface, with "
         f"a correlation length of {length:g} µm, scaled to Sq, on square cells of {cell:g} µm. "

@@ -117,6 +117,7 @@ def case_of(point: Point) -> Case:
         "contact.roughness": "standing",
         "surface.sq": f"{point.sq} um",
         "grid.cells": "auto",
+        "thermal.inlet_heating": True,
     }
     chosen = _without_limits().with_written(written)
     a = chosen.conditions.hertz.half_widths[0]

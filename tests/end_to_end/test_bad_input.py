@@ -49,8 +49,8 @@ MISTAKES = {
     "mistyped section": ("[contact]", "[contcat]", ("contcat", "did you mean contact?")),
     "unknown law": (
         'law = "barus"',
-        'law = "doolittle"',
-        ("viscosity.law", "doolittle", "barus, roelands"),
+        'law = "reynolds"',
+        ("viscosity.law", "reynolds", "barus, roelands"),
     ),
     "wrong unit": ('load = "500 N"', 'load = "500 mm"', ("contact.load", "500 mm", "a force")),
     "unknown unit": ('mass = "0.1 kg"', 'mass = "0.1 kq"', ("vibration.mass", "0.1 kq", "a mass")),
