@@ -65,6 +65,8 @@ def alpha_effect(case: Case, solution: ContactSolution) -> AlphaEffect | None:
     sheet, oil = case.oil_sheet, solution.lubricant
     if sheet is None or sheet.alpha is not None or oil is None:
         return None
+    if not solution.convergence.converged:
+        return None
     law = oil.viscosity
     assert isinstance(law, Barus | Roelands)  # of a data sheet
     states = [contact_state(solution)]

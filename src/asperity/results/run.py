@@ -274,8 +274,9 @@ class Run(Displayed):
 
     @cached_property
     def alpha_effect(self) -> AlphaEffect | None:
-        """Effect of an estimated alpha on film and load share."""
-        return alpha_effect(self.case, self.solution)
+        """Effect of an estimated alpha on film and load share, from standing roughness."""
+        standing = self.snapshot_clr is not None
+        return alpha_effect(self.case, self.solution) if standing else None
 
     @cached_property
     def card(self) -> RegimeCard:
