@@ -490,7 +490,7 @@ def test_swept_pairs_tables_and_mixed_values_become_text_columns(
 
 
 def test_inlet_shear_heating_is_computed_at_every_point_or_at_none():
-    """As the base case needs it, so that no step of the film lies between two points."""
+    """The base case decides, so that no step of the film lies between two points."""
     paper = load_case(EXAMPLES / "paper.toml")
     slow = paper.with_overrides({"contact.entrainment_speed": "1 m/s"})
     fast = paper.with_overrides({"contact.entrainment_speed": "8 m/s"})
