@@ -3,7 +3,7 @@
 A file begins with a line such as MTM311 Test Data File. A step begins with Step, its number and
 the time at which it started; its table has a header that begins with Step Time (s) or Rolling Speed
 (mm/s), fields separated by tabs, and ends with an empty line. The layout was read off public
-exports.
+exports of an MTM and a public reader of those of an EHD rig.
 """
 
 import re
