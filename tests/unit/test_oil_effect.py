@@ -1,6 +1,7 @@
 """Effect of an estimated pressure-viscosity coefficient on film and load share."""
 
 import math
+from pathlib import Path
 
 import pytest
 
@@ -15,30 +16,9 @@ FILM = next(entry.case for entry in load_experiments() if entry.name == "fva3-25
         "thermal.inlet_heating": False,
     }
 )
-ROUGH = """
-[contact]
-geometry = "line"
-radius = "5.4 mm"
-length = "10 mm"
-load = "500 N"
-entrainment_speed = "1.91 m/s"
-slip = 0.2
-roughness = "standing"
-[material]
-youngs_modulus = "200 GPa"
-poisson_ratio = 0.3
-hardness = "2 GPa"
-[lubricant]
-grade = "VG 100"
-temperature = "70 degC"
-rheology = { law = "newtonian" }
-[surface]
-kind = "gaussian"
-sq = "0.4 um"
-correlation_length = "30 um"
-[grid]
-cells = [96, 32]
-"""
+ROUGH = load_case(Path(__file__).parents[2] / "examples" / "data-sheet-oil.toml").with_overrides(
+    {"contact.roughness": "standing", "grid.cells": [96, 32], "vibration": "none"}
+)
 
 
 def test_the_film_of_a_smooth_contact_scales_with_about_the_root_of_alpha():
@@ -60,7 +40,7 @@ def test_the_film_of_a_smooth_contact_scales_with_about_the_root_of_alpha():
 
 
 def test_a_thinner_film_carries_less_of_the_load():
-    run = solve_case(load_case(ROUGH))
+    run = solve_case(ROUGH)
     summary = run.summary()["alpha_effect"]
     assert set(summary) == {"alpha_error", "h_central_m", "h_mean_m", "h_min_m", "clr"}
     low, high = summary["clr"]
@@ -71,11 +51,8 @@ def test_a_thinner_film_carries_less_of_the_load():
 
 
 def test_a_given_alpha_and_a_dry_contact_have_no_effect():
-    given = load_case(ROUGH).with_overrides({"lubricant.alpha": "20 1/GPa"})
+    given = ROUGH.with_overrides({"lubricant.alpha": "20 1/GPa"})
     assert "alpha_effect" not in solve_case(given).summary()
-    text = ROUGH[: ROUGH.index("[lubricant]")] + ROUGH[ROUGH.index("[surface]") :]
-    dry = solve_case(
-        load_case('lubricant = "none"\n' + text.replace('roughness = "standing"\n', ""))
-    )
+    dry = solve_case(ROUGH.with_overrides({"lubricant": "none"}))
     assert dry.alpha_effect is None
     assert "oil" not in dry.summary()

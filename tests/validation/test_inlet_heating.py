@@ -10,7 +10,7 @@ from asperity.benchmark import load_experiments
 from asperity.case import case_template, load_case
 from asperity.contact.conditions import ContactConditions, ElasticPair
 from asperity.contact.grid import Grid
-from asperity.core.errors import AsperityError, BadInput
+from asperity.core.errors import AsperityError, BadInput, NotConverged
 from asperity.ehl import inlet_heating_factor, solve_contact
 from asperity.lubricant import (
     Barus,
@@ -247,6 +247,16 @@ def test_heat_without_an_end_is_an_error(monkeypatch):
     conditions = rolling(1.1)
     with pytest.raises(AsperityError, match=r"thermal\.inlet_heating=false"):
         inlet_heating(conditions, OIL, grid_of(conditions), THERMAL)
+
+
+def test_smooth_bodies_that_do_not_converge_are_an_error_with_a_remedy(monkeypatch):
+    """It carries no solution: that of smooth bodies on a coarse grid would pass for the contact."""
+    conditions = rolling(1.2)
+    few = inlet.Options(tolerance=inlet.CONVERGED, max_iterations=1)
+    monkeypatch.setattr(inlet, "Options", lambda **_: few)
+    with pytest.raises(AsperityError, match=r"smooth bodies.*inlet_heating=false") as refused:
+        inlet_heating(conditions, OIL, grid_of(conditions), THERMAL)
+    assert not isinstance(refused.value, NotConverged)
 
 
 class TestTransport:

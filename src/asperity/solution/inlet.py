@@ -33,7 +33,7 @@ from threadpoolctl import threadpool_limits
 from asperity.contact.conditions import ContactConditions
 from asperity.contact.grid import MIN_CELLS, Grid
 from asperity.core.arrays import Field, Mask, usual_float_errors
-from asperity.core.errors import AsperityError
+from asperity.core.errors import AsperityError, NotConverged
 from asperity.ehl import (
     ContactSolution,
     Options,
@@ -90,14 +90,6 @@ class InletHeating:
 
     def factor_on(self, grid: Grid) -> Field:
         """Return the viscosity factor on another grid of the same contact, (nx, ny)."""
-        return np.exp(self._on(np.log(self.viscosity_factor), grid))
-
-    def rise_on(self, grid: Grid) -> Field:
-        """Return the temperature rise [K] on another grid of the same contact, (nx, ny)."""
-        return self._on(self.rise, grid)
-
-    def _on(self, field: Field, grid: Grid) -> Field:
-        """Return a field on another grid, interpolated linearly."""
         positions = (
             (centres - low) / step - 0.5
             for centres, low, step in zip(
@@ -105,7 +97,10 @@ class InletHeating:
             )
         )
         where = np.meshgrid(*positions, indexing="ij")
-        return np.asarray(scipy.ndimage.map_coordinates(field, where, order=1, mode="nearest"))
+        logs = np.log(self.viscosity_factor)
+        return np.asarray(
+            np.exp(scipy.ndimage.map_coordinates(logs, where, order=1, mode="nearest"))
+        )
 
 
 def heats_inlet(
@@ -160,13 +155,17 @@ def inlet_heating(
 
     Raises
     ------
-    NotConverged
-        if the contact of the smooth bodies does not converge.
     AsperityError
-        if heat and film do not converge.
+        if the contact of the smooth bodies, or heat and film together, do not converge.
     """
     with threadpool_limits(1):  # sums depend on the number of threads
-        return _solved(conditions, lubricant, grid, thermal)
+        try:
+            return _solved(conditions, lubricant, grid, thermal)
+        except NotConverged as failure:  # its solution is not that of the contact asked for
+            raise AsperityError(
+                f"inlet shear heating: smooth bodies, {failure}; set thermal.inlet_heating=false "
+                "to compute the film without it"
+            ) from None
 
 
 def _solved(
@@ -179,8 +178,9 @@ def _solved(
     )
     mixer = Mixer()
     log_factor: Field = np.zeros(surface.grid.cells)
-    eta0 = np.full(surface.grid.cells, lubricant.viscosity.eta0)
-    base = thermal.warmth.factor(eta0, _base_temperature(thermal) + 0.0 * eta0, thermal.ambient)
+    eta0: Field = np.full(surface.grid.cells, lubricant.viscosity.eta0)
+    temperature = np.full_like(eta0, _base_temperature(thermal))
+    base = thermal.warmth.factor(eta0, temperature, thermal.ambient)
     cold = solution = solve_contact(
         conditions, lubricant, surface, options=options, viscosity_factor=base
     )
