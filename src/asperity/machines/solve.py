@@ -22,6 +22,7 @@ from asperity.core.processes import cores
 from asperity.machine import MachineContact
 from asperity.machines.result import MachineResult, condition_row
 from asperity.results import Run, load_run, solve_case
+from asperity.solution import heats_inlet
 from asperity.study import DONE, StudyPlan, StudyProgress, plan_points, run_study
 
 ALL_CELLS = 1_000_000  # of all automatic grids together: about two minutes on two processors
@@ -142,7 +143,7 @@ def _plan(
 
 
 def _effort(case: Case, max_cells: int) -> JsonObject:
-    """Return overrides for the cells and surfaces of a contact."""
+    """Return overrides for the cells and surfaces of a contact, and its own inlet shear heating."""
     smaller = _smaller_grid(case, max_cells)
     coarse = case.with_written(smaller) if smaller else case
     nx, ny = coarse.grid.cells
@@ -150,7 +151,12 @@ def _effort(case: Case, max_cells: int) -> JsonObject:
     stated = case.contents.solver.surfaces
     if stated is None:
         stated = min(coarse.surface_count(), surfaces)
-    return {**smaller, "solver.surfaces": stated}
+    effort: JsonObject = {**smaller, "solver.surfaces": stated}
+    if case.lubricant is not None and case.thermal.inlet_heating is None:
+        # as `solve` decides for this contact; a study decides once, from its base case
+        heated = heats_inlet(case.conditions, case.lubricant, case.thermal)
+        effort["thermal.inlet_heating"] = heated
+    return effort
 
 
 def _smaller_grid(case: Case, max_cells: int) -> JsonObject:
