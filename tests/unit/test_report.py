@@ -258,8 +258,8 @@ def test_page_loads_nothing(fixture, request):
         ("Contact area ratio", "37.1", "%"),
         ("Domain contact area ratio", "60.3", "%"),
         ("Composite roughness", "1.25", "µm"),
-        ("Minimum film thickness", "0.005", "µm"),
-        ("Central film thickness", "0.512", "µm"),
+        ("Minimum film thickness", "0.005 (± not determined)", "µm"),
+        ("Central film thickness", "0.512 (± not determined)", "µm"),
         ("Mean film thickness", "0.634", "µm"),
         ("Lambda ratio", "0.58", ""),
         ("Maximum pressure", "1.987", "GPa"),
@@ -425,7 +425,7 @@ def test_figures_show_error_bars_where_visible():
     )
     assert (
         next(value for name, value in rows.items() if name.startswith("Central film thickness"))
-        == "0.512 ± 0.007"
+        == "0.512 (0.505 to 0.519)"
     )
     assert (
         next(value for name, value in rows.items() if name.startswith("Minimum film thickness"))

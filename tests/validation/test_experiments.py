@@ -8,7 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asperity.benchmark import compare_with, load_experiments
+from asperity.benchmark import (
+    Experiment,
+    ExperimentResult,
+    NotComputed,
+    compare_with,
+    load_experiments,
+)
 from asperity.cli import main
 from asperity.contact.conditions import ContactConditions, ElasticPair
 from asperity.core.errors import BadInput
@@ -23,7 +29,8 @@ from asperity.lubricant import (
 )
 
 PAGE = Path(__file__).parents[2] / "docs" / "measured" / "experiment.md"
-SETS = {experiment.name: experiment for experiment in load_experiments()}
+LOADED = load_experiments()
+SETS = {entry.name: entry for entry in LOADED if isinstance(entry, Experiment)}
 
 
 @pytest.mark.parametrize("name", SETS)
@@ -57,6 +64,17 @@ def test_the_page_states_every_set():
         assert cells[4].endswith(f" {100.0 * experiment.isothermal_scatter:.1f} %")
         assert experiment.source.split(" (")[0].split(";")[0].removeprefix("github.com/") in text
     assert f"{sum(len(experiment.points) for experiment in films)} films in five sets" in text
+
+
+def test_friction_of_a_growing_tribofilm_is_listed_as_not_computed():
+    """Measured friction doubles at constant conditions."""
+    (missing,) = [entry for entry in LOADED if isinstance(entry, NotComputed)]
+    values = [point.value for point in missing.points]
+    assert (len(values), values[0], values[-1]) == (24, 0.0588, 0.1176)
+    result = ExperimentResult((), (), (missing,))
+    assert result.verdict().startswith("Not computed: Friction while a tribofilm grows (24 values")
+    assert result.scalars()["not_computed"][0]["measured"] == values
+    assert f"| {values[0]:.3f} |" in PAGE.read_text("utf-8")
 
 
 def test_a_change_of_the_film_by_a_percent_is_detected():

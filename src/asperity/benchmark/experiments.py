@@ -1,12 +1,7 @@
-"""asperity against experiment: measured films and resonances beside computed ones.
-
-A set of measurements is a file: its case, the conditions and measured value of every point, what
-was given, what had to be assumed, and what was fitted.
-"""
+"""asperity against experiment: measured films, resonances and profiles beside computed ones."""
 
 import math
-import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import cast
@@ -14,65 +9,23 @@ from typing import cast
 import numpy as np
 import pandas
 
-from asperity.benchmark.tribometer import read_tribometer
-from asperity.case import Case, load_case
+from asperity.benchmark.dimples import DimpleProfile, compute_dimples
+from asperity.benchmark.measurements import (
+    DimpleExperiment,
+    Experiment,
+    NotComputed,
+    load_experiments,
+)
+from asperity.case import Case
 from asperity.core import files
 from asperity.core.errors import AsperityError, BadInput
 from asperity.core.quantities import quantity
 from asperity.results import solve_case
 
-_IN_PACKAGE = Path(__file__).with_name("experiments")  # of an installed wheel
-_IN_REPOSITORY = Path(__file__).parents[3] / "benchmark" / "experiments"
-UNITS = {"nm": 1e-9, "Hz": 1.0}  # of measured values, in SI
 MAX_FITS = 6  # rounds; two or three suffice
 FIT_TOLERANCE = 1e-3  # of the mean ratio
 FIT_POWER = 0.67  # of viscosity in film formulas, for the first round
-VISCOSITY, ALPHA = "lubricant.viscosity_40", "lubricant.alpha"
-
-
-@dataclass(frozen=True, kw_only=True)
-class MeasuredPoint:
-    """Measured value [SI] with the case's values at it, and the deviation of repeats, if known.
-
-    `swept` is the value that varies from point to point, in the unit of the file's first column.
-    """
-
-    conditions: Mapping[str, str]
-    swept: float
-    value: float
-    deviation: float | None = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class Experiment:
-    """A set of measurements.
-
-    Parameters
-    ----------
-    given, assumed : inputs of the computation, in words
-    fits_viscosity : the oil's viscosity is fitted, so that the mean ratio is 1
-    missed : where computation and measurement differ, in words; may be empty
-    key : key of the measured quantity in the catalogue
-    swept : name and unit of the value that varies from point to point
-    mean, scatter, isothermal_scatter : of computed over measured, the last without inlet shear
-        heating, as documented; the tests hold the solver to them
-    """
-
-    name: str
-    title: str
-    source: str
-    rig: str
-    given: str
-    assumed: str
-    fits_viscosity: bool
-    missed: str
-    key: str
-    swept: str
-    mean: float
-    scatter: float
-    isothermal_scatter: float
-    case: Case
-    points: tuple[MeasuredPoint, ...]
+VISCOSITY = "lubricant.viscosity_40"
 
 
 @dataclass(frozen=True)
@@ -153,12 +106,25 @@ class Comparison:
 
 @dataclass(frozen=True)
 class ExperimentResult:
-    """Comparison with every set."""
+    """Comparison with every set; `profiles` are those of dimples."""
 
     comparisons: tuple[Comparison, ...]
+    profiles: tuple[DimpleProfile, ...] = ()
+    not_computed: tuple[NotComputed, ...] = ()
 
     def verdict(self) -> str:
-        """Return one sentence: points, sets, and deviations of films where nothing is fitted."""
+        """Return the deviations where nothing is fitted, and what is not computed."""
+        parts = [
+            *([self._of_values()] if self.comparisons else []),
+            *([self._of_profiles()] if self.profiles else []),
+            *(
+                f"Not computed: {entry.title} ({len(entry.points)} values; {entry.not_computed})."
+                for entry in self.not_computed
+            ),
+        ]
+        return " ".join(parts)
+
+    def _of_values(self) -> str:
         ratios = [
             point.ratio
             for comparison in self.comparisons
@@ -176,6 +142,14 @@ class ExperimentResult:
         return (
             f"{points} measured values in {len(self.comparisons)} sets: {without_fit}largest "
             f"scatter of a set {100.0 * worst.scatter:.1f} % ({worst.experiment.title})."
+        )
+
+    def _of_profiles(self) -> str:
+        simulated = max(profile.from_simulated for profile in self.profiles)
+        measured = max(profile.from_measured for profile in self.profiles)
+        return (
+            f"Films over a dimple within {100.0 * simulated:.1f} % of a published simulation and "
+            f"{100.0 * measured:.0f} % of {len(self.profiles)} measured profiles."
         )
 
     def rows(self) -> list[dict[str, object]]:
@@ -207,91 +181,29 @@ class ExperimentResult:
             }
             for comparison in self.comparisons
         ]
-        return {"verdict": self.verdict(), "sets": sets, "rows": self.rows()}
+        not_computed = [
+            {
+                "experiment": entry.name,
+                "title": entry.title,
+                "source": entry.source,
+                "rig": entry.rig,
+                "reason": entry.not_computed,
+                "measured": [point.value for point in entry.points],
+            }
+            for entry in self.not_computed
+        ]
+        return {
+            "verdict": self.verdict(),
+            "sets": sets,
+            "rows": self.rows(),
+            "profiles": [profile.row() for profile in self.profiles],
+            "not_computed": not_computed,
+        }
 
     def save(self, path: Path) -> Path:
         """Write the rows as CSV."""
         files.write_csv(path, pandas.DataFrame(self.rows()))
         return path
-
-
-def load_experiments(folder: Path | None = None) -> tuple[Experiment, ...]:
-    """Load the sets of a folder, by default those packaged with asperity.
-
-    Raises
-    ------
-    BadInput
-        for a folder without sets, or an invalid file.
-    """
-    source = folder or (_IN_PACKAGE if _IN_PACKAGE.is_dir() else _IN_REPOSITORY)
-    paths = sorted(source.glob("*.toml"))
-    if not paths:
-        raise BadInput(f"{source} contains no measurements (*.toml); choose another folder")
-    return tuple(_read(path) for path in paths)
-
-
-def _read(path: Path) -> Experiment:
-    try:
-        content = tomllib.loads(path.read_text("utf-8"))
-        case = load_case(content.pop("case"))
-        columns = content.pop("columns")
-        export = content.pop("export", None)
-        rows = content.pop("points") if export is None else _exported(path, export)
-        if not rows:
-            raise ValueError("points is empty")
-        return Experiment(
-            name=path.stem,
-            case=case,
-            key=content.pop("quantity"),
-            swept=columns[0],
-            points=tuple(_point(columns, row) for row in rows),
-            **content,
-        )
-    except (
-        tomllib.TOMLDecodeError,
-        UnicodeDecodeError,
-        LookupError,
-        TypeError,
-        ValueError,
-    ) as error:
-        raise BadInput(
-            f"{path} is not a set of measurements: {error!r}; compare it with those of asperity"
-        ) from None
-
-
-def _exported(path: Path, export: Mapping[str, object]) -> list[list[float]]:
-    """Return the rows of a tribometer's export beside a set, without incomplete ones.
-
-    `export` states its `file`, the `columns` in the order of the set's, and perhaps the `steps`.
-    """
-    test = read_tribometer(path.parent / str(export["file"]))
-    columns, steps = cast(list[str], export["columns"]), export.get("steps")
-    tables = [
-        step.table for step in test.steps if steps is None or step.number in cast(list[int], steps)
-    ]
-    rows: list[list[float]] = []
-    for table in tables:
-        if set(columns) <= set(table.columns):
-            rows += table[columns].dropna().to_numpy(float).tolist()
-    return rows
-
-
-def _point(columns: list[str], row: list[float]) -> MeasuredPoint:
-    """Return a point from a row under columns such as `contact.load [N]` and `measured [nm]`."""
-    conditions: dict[str, str] = {}
-    measured: dict[str, float] = {}
-    for column, number in zip(columns, row, strict=True):
-        name, _, unit = column.rstrip("]").partition(" [")
-        if name in ("measured", "deviation"):
-            measured[name] = number * UNITS[unit]
-        else:
-            conditions[name] = f"{number:.9g} {unit}"
-    return MeasuredPoint(
-        conditions=conditions,
-        swept=float(row[0]),
-        value=measured["measured"],
-        deviation=measured.get("deviation"),
-    )
 
 
 def compare_experiments(
@@ -306,12 +218,19 @@ def compare_experiments(
     NotConverged
         if a contact does not converge.
     """
-    comparisons = []
+    comparisons: list[Comparison] = []
+    profiles: list[DimpleProfile] = []
+    not_computed: list[NotComputed] = []
     for experiment in load_experiments(folder):
         if progress is not None:
             progress(experiment.title)
-        comparisons.append(compare_with(experiment))
-    return ExperimentResult(tuple(comparisons))
+        if isinstance(experiment, NotComputed):
+            not_computed.append(experiment)
+        elif isinstance(experiment, DimpleExperiment):
+            profiles += compute_dimples(experiment)
+        else:
+            comparisons.append(compare_with(experiment))
+    return ExperimentResult(tuple(comparisons), tuple(profiles), tuple(not_computed))
 
 
 def compare_with(experiment: Experiment) -> Comparison:
@@ -342,17 +261,13 @@ def compare_with(experiment: Experiment) -> Comparison:
 
 
 def _compute(experiment: Experiment, case: Case) -> tuple[ComparedPoint, ...]:
-    spread = None if experiment.fits_viscosity else _alpha_effect(experiment, case)
+    low_key, high_key = quantity(experiment.key).ends
+    with_limits = not experiment.fits_viscosity and case.lubricant is not None
     points = []
     for point in experiment.points:
         at_point = case.with_overrides(point.conditions)
         numbers = solve_case(at_point).scalars()
         value = cast(float, numbers[experiment.key])
-        error = cast(float, numbers.get(quantity(experiment.key).deviation) or 0.0)
-        low, high = None, None
-        if spread is not None:
-            low = value - math.hypot(error, spread[0] * value)
-            high = value + math.hypot(error, spread[1] * value)
         points.append(
             ComparedPoint(
                 experiment=experiment.name,
@@ -361,8 +276,8 @@ def _compute(experiment: Experiment, case: Case) -> tuple[ComparedPoint, ...]:
                 measured=point.value,
                 deviation=point.deviation,
                 computed=value,
-                low=low,
-                high=high,
+                low=cast(float | None, numbers[low_key]) if with_limits else None,
+                high=cast(float | None, numbers[high_key]) if with_limits else None,
                 isothermal=value,
             )
         )
@@ -386,26 +301,3 @@ def _without_heat(
         )
         for compared, point in zip(points, experiment.points, strict=True)
     )
-
-
-def _alpha_effect(experiment: Experiment, case: Case) -> tuple[float, float] | None:
-    """Return the relative effect of the ends of alpha's interval at the middle point.
-
-    None for a dry contact, whose interval would be that of the assumed modulus.
-    """
-    middle = case.with_overrides(experiment.points[len(experiment.points) // 2].conditions)
-    if middle.lubricant is None:
-        return None
-    alpha, error = (
-        float(middle.lubricant.viscosity.log_slope(np.zeros(1))[0]),
-        middle.lubricant.alpha_error,
-    )
-    low, value, high = (
-        cast(float, solve_case(one_case).scalars()[experiment.key])
-        for one_case in (
-            middle.with_overrides({ALPHA: (1.0 - error) * alpha}),
-            middle,
-            middle.with_overrides({ALPHA: (1.0 + error) * alpha}),
-        )
-    )
-    return 1.0 - low / value, high / value - 1.0

@@ -97,6 +97,7 @@ def _compare_with_experiments(
         result.verdict(),
         lambda: result.scalars() | {"written": [str(path) for path in saved]},
         _set_rows(result),
+        _profile_rows(result),
         written("Written", *saved) if saved else [],
         as_json=as_json,
         quiet=quiet,
@@ -125,6 +126,29 @@ def _set_rows(result: "ExperimentResult") -> Block:
         "interval of the mean",
     ]
     yield from columns(heads, rows, left=1)
+
+
+def _profile_rows(result: "ExperimentResult") -> Block:
+    """Return a row per profile of a dimple; nothing without any."""
+    rows = [
+        [
+            f"{entry.run}, profile {entry.number}",
+            f"{100.0 * entry.from_measured:.1f}",
+            f"{100.0 * entry.from_simulated:.1f}",
+            f"{100.0 * entry.simulated_from_measured:.1f}",
+            "" if (ratio := entry.upstream_ratio) is None else f"{ratio:.3f}",
+        ]
+        for entry in result.profiles
+    ]
+    heads = [
+        "film over a dimple",
+        "from the measured [%]",
+        "from the simulated [%]",
+        "simulated from measured [%]",
+        "upstream ratio",
+    ]
+    if rows:
+        yield from columns(heads, rows, left=1)
 
 
 def _rows(result: "BenchmarkResult") -> Block:

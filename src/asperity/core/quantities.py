@@ -156,9 +156,8 @@ class Quantity:
     @property
     def ends(self) -> tuple[str, str]:
         """Keys of the ends of the 90 % interval: `crf_low_hz` and `crf_high_hz` of `crf_hz`."""
-        stem, unit = (
-            (self.key.removesuffix("_hz"), "_hz") if self.key.endswith("_hz") else (self.key, "")
-        )
+        unit = next((end for end in ("_hz", "_m") if self.key.endswith(end)), "")
+        stem = self.key.removesuffix(unit)
         return f"{stem}_low{unit}", f"{stem}_high{unit}"
 
     def number_in(self, values: Table) -> str:
@@ -172,7 +171,7 @@ class Quantity:
         value = values.get(self.key)
         if isinstance(value, str):
             return value
-        (low, high) = (_as_float(values.get(end)) for end in self.ends)
+        low, high = (_as_float(values.get(end)) for end in self.ends)
         if self.ends[0] not in values:
             deviation = _as_float(values.get(self.deviation))
             clipped = self.clipped_interval(_as_float(value), deviation)
@@ -181,11 +180,12 @@ class Quantity:
                 if clipped is None
                 else f"{self.number(value)} ({self._span(*clipped)})"
             )
-        if value is None or low == high == value:
-            return self.number(value)
-        if low is None or high is None:
-            return f"{self.number(value)} ({UNKNOWN})"
-        return f"{self.number(value)} ({self._span(low, high)})"
+        number = self.number(value)
+        if value is not None and (low is None or high is None):
+            return f"{number} ({UNKNOWN})"
+        if low is None or high is None or self.number(low) == self.number(high) == number:
+            return number
+        return f"{number} ({self._span(low, high)})"
 
     def clipped_interval(
         self, value: float | None, deviation: float | None

@@ -240,11 +240,10 @@ def _range_y(
     """Return the ends of the grid across rolling [m]."""
     a, b = conditions.hertz.half_widths
     if conditions.endless:
-        length = (
-            2.0 * a
-            if texture is None
-            else max(2.0 * a, CORRELATION_LENGTHS * _finite(texture.lengths[1], a))
-        )
+        length = 2.0 * a
+        if texture is not None:  # straight ridges across y have no length
+            lay = texture.lengths[1]
+            length = max(length, CORRELATION_LENGTHS * (lay if math.isfinite(lay) else a))
         return _fit_texture(-length / 2.0, length / 2.0, texture, 1)
     if conditions.geometry == "roller":
         return _roller_range(conditions, lubricant, texture, accuracy)
@@ -394,22 +393,23 @@ def _cells(
     accuracy: float,
     extent: tuple[float, float],
 ) -> tuple[int, int]:
-    """Return the number of cells: the target, or reduced towards the minimum if it is too large."""
+    """Return the number of cells: the target, or fewer if it is too large."""
     refinement = math.sqrt(ACCURACY / accuracy)
     target = _counts(_spacing(conditions, lubricant, texture, refinement), extent)
     # under a light load the film is wider than the Hertz zone
     if conditions.geometry == "roller" and texture is None:
         target = min(target[0], MAX_ROLLER_CELLS * max(refinement, 0.5)), target[1]
-    max_cells = MAX_CELLS * max(1.0, ACCURACY / accuracy)
-    if texture is not None and target[0] * target[1] > max_cells:
-        fewest = _counts(_spacing(conditions, lubricant, texture, 0.0), extent)
-        target = _reduced(target, fewest, max_cells)
     if texture is not None:
+        max_cells = MAX_CELLS * max(1.0, ACCURACY / accuracy)
+        if target[0] * target[1] > max_cells:
+            fewest = _counts(_spacing(conditions, lubricant, texture, 0.0), extent)
+            target = _reduced(target, fewest, max_cells)
         accepted = _counts(texture.largest_cell, extent)
         _require_affordable(accepted)
+        target = max(target[0], accepted[0]), max(target[1], accepted[1])
+    if texture is not None or not (lubricant is None or conditions.endless):
         # a coarser grid must be possible for the error estimate
-        least = 2.0 * MIN_COARSE_CELLS, 2.0 * MIN_CELLS_SHORT_AXIS
-        target = max(target[0], accepted[0], least[0]), max(target[1], accepted[1], least[1])
+        target = max(target[0], 2.0 * MIN_COARSE_CELLS), max(target[1], 2.0 * MIN_CELLS_SHORT_AXIS)
     return _even(target[0]), _even(target[1])
 
 
@@ -438,11 +438,6 @@ def _reduced(
 def _counts(spacing: tuple[float, float], extent: tuple[float, float]) -> tuple[float, float]:
     """Return the cells along x and y."""
     return extent[0] / spacing[0], extent[1] / spacing[1]
-
-
-def _finite(length: float, otherwise: float) -> float:
-    """Return a length, or `otherwise` where it is infinite."""
-    return length if math.isfinite(length) else otherwise
 
 
 def _even(count: float) -> int:

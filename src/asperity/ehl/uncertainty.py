@@ -23,6 +23,8 @@ class Uncertainty:
     surfaces : from surface to surface of one kind, of a running contact from the finite time and
         number of tracks; None where the result is about one surface
     record : from the length of one record; NONE for a number that needs no record
+    oil : from an estimated pressure-viscosity coefficient; None where undetermined, NONE for one
+        that is stated
     range : bounds of the number
     """
 
@@ -31,6 +33,7 @@ class Uncertainty:
     grid: Sides | None
     surfaces: Sides | None = None
     record: Sides | None = NONE
+    oil: Sides | None = NONE
     range: tuple[float, float] = (-math.inf, math.inf)
 
     @property
@@ -46,12 +49,10 @@ class Uncertainty:
 
         Independent parts add in quadrature.
         """
-        if self.numerical is None or self.record is None:
+        if self.numerical is None or self.record is None or self.oil is None:
             return None
-        below, above = (
-            math.hypot(*parts)
-            for parts in zip(self.numerical, self.surfaces or NONE, self.record, strict=True)
-        )
+        sides = (self.numerical, self.surfaces or NONE, self.record, self.oil)
+        below, above = (math.hypot(*parts) for parts in zip(*sides, strict=True))
         least, most = self.range
         return min(max(self.value - below, least), self.value), max(
             min(self.value + above, most), self.value

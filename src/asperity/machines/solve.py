@@ -31,8 +31,8 @@ FINE_CONTACT_GRID = 128 * 128  # cells above which a contact counts as fine: few
 WORST = "worst.nc"
 SOLVED_KEYS = (  # quantities of a solved contact
     *(
-        "h_central_m",
-        "h_min_m",
+        *("h_central_m", "h_central_low_m", "h_central_high_m"),
+        *("h_min_m", "h_min_low_m", "h_min_high_m"),
         "lambda_ratio",
         "clr",
         "clr_low",

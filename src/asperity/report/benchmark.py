@@ -3,10 +3,16 @@
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
-from asperity.benchmark import BenchmarkResult, Comparison, ExperimentResult
+from asperity.benchmark import (
+    BenchmarkResult,
+    Comparison,
+    DimpleProfile,
+    ExperimentResult,
+    NotComputed,
+)
 from asperity.core.errors import BadInput
 from asperity.core.quantities import quantity
 from asperity.report.style import BLUE, GREEN, GREY, ON_PAGE, SPLIT_COLOUR, VERMILION
@@ -63,16 +69,67 @@ def _panel(axes: Axes, result: BenchmarkResult) -> None:
 
 @ON_PAGE.drawing()
 def experiment_figure(result: ExperimentResult) -> Figure:
-    """Draw measured and computed values, and their ratio, over the varied value; a row per set."""
+    """Draw every set in a row: measured and computed values, and their ratio.
+
+    Rows of profiles over a dimple and of what is not computed follow.
+    """
     shown = [entry for entry in result.comparisons if len(entry.points) > 1]
-    if not shown:
+    runs = dict.fromkeys(profile.run for profile in result.profiles)
+    heights = [2.6] * len(shown) + [2.0] * len(runs) + [2.2] * len(result.not_computed)
+    if not heights:
         raise BadInput("a figure needs a set of two or more measured values; write a .csv")
-    figure = Figure(figsize=(ON_PAGE.double, 2.6 * len(shown)), layout="constrained")
-    rows = figure.subplots(len(shown), 2, squeeze=False, sharex="row")
-    for (values, ratios), entry in zip(rows, shown, strict=True):
+    figure = Figure(figsize=(ON_PAGE.double, sum(heights)), layout="constrained")
+    column = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)
+    rows = iter(column[:, 0])
+    for entry, row in zip(shown, rows, strict=False):
+        values, ratios = row.subplots(1, 2, sharex=True)
         _values_panel(values, entry)
         _ratio_panel(ratios, entry)
+    for run, row in zip(runs, rows, strict=False):
+        row.suptitle(f"Dimple, {run}", fontsize="medium")
+        _profile_panels(row, [profile for profile in result.profiles if profile.run == run])
+    for missing, row in zip(result.not_computed, rows, strict=False):
+        _measured_panel(row.subplots(), missing)
     return figure
+
+
+def _profile_panels(row: SubFigure, profiles: list[DimpleProfile]) -> None:
+    panels = row.subplots(1, len(profiles), sharex=True, sharey=True, squeeze=False)[0]
+    for axes, profile in zip(panels, profiles, strict=True):
+        _profile_panel(axes, profile)
+    panels[0].set_ylabel("film [µm]")
+    panels[0].legend(fontsize="x-small")
+
+
+def _profile_panel(axes: Axes, profile: DimpleProfile) -> None:
+    """Draw the measured, the simulated and the computed film on the axis at a moment."""
+    for (x, film), style, colour, name in (
+        (profile.measured, ".", VERMILION, "measured"),
+        (profile.simulated, "--", GREY, "simulated"),
+        ((profile.x, profile.beside_measured), "-", BLUE, "computed"),
+    ):
+        axes.plot(1e6 * x, 1e6 * film, style, color=colour, label=name, markersize=2)
+    half = 1e6 * profile.half_width
+    axes.set_xlim(-half, half)
+    axes.set_ylim(0.0, 1.3e6 * float(np.percentile(profile.measured[1], 90)))
+    axes.set_xlabel("x [µm]")
+
+
+def _measured_panel(axes: Axes, missing: NotComputed) -> None:
+    """Draw measured values that cannot be computed."""
+    kind, points = quantity(missing.key), missing.points
+    axes.errorbar(
+        [point.swept for point in points],
+        [point.value * kind.factor for point in points],
+        [(point.deviation or 0.0) * kind.factor for point in points],
+        fmt="o",
+        color=VERMILION,
+        markersize=3,
+    )
+    axes.set_ylim(0.0)
+    axes.set_xlabel(missing.swept)
+    axes.set_ylabel(kind.label)
+    axes.set_title(f"{missing.title}: not computed")
 
 
 def _values_panel(axes: Axes, entry: Comparison) -> None:

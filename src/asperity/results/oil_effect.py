@@ -1,4 +1,4 @@
-"""Effect of an estimated pressure-viscosity coefficient on film and load share."""
+"""Effect of an estimated pressure-viscosity coefficient on film, load share and resonance."""
 
 from dataclasses import dataclass, replace
 
@@ -6,8 +6,9 @@ from threadpoolctl import threadpool_limits
 
 from asperity.case import Case
 from asperity.core.quantities import quantity
-from asperity.ehl import ContactSolution, ContactState
+from asperity.ehl import ContactError, ContactSolution, ContactState, Sides
 from asperity.lubricant import STATED_ALPHA_ERROR, Barus, Roelands
+from asperity.results.surface_spread import crf_sides
 from asperity.solution import contact_state, solve_thermal_contact
 
 Ends = tuple[float, float]
@@ -28,6 +29,16 @@ class AlphaEffect:
     error: float
     films: dict[str, Ends]
     clr: Ends
+
+    @property
+    def clr_sides(self) -> Sides:
+        """Error of the load share below and above it."""
+        return _sides(self.clr)
+
+    def film_sides(self, key: str) -> Sides:
+        """Return the relative error of a film below and above it."""
+        low, high = self.films[key]
+        return _sides((low - 1.0, high - 1.0))
 
     def ends(self, state: ContactState) -> dict[str, Ends]:
         """Return the values at both ends by key, SI, for a contact with these means."""
@@ -51,10 +62,37 @@ class AlphaEffect:
             f"Alpha is estimated, ± {100.0 * self.error:.0f} %: at the ends of this interval the "
             f"{central.name} is {central.text(ends['h_central_m'][0])} and "
             f"{central.text(ends['h_central_m'][1])}, the {clr.name} {clr.text(ends['clr'][0])} "
-            f"and {clr.text(ends['clr'][1])}; other intervals exclude this. A measured alpha "
+            f"and {clr.text(ends['clr'][1])}. A measured alpha "
             f"(± {100.0 * STATED_ALPHA_ERROR:.0f} %) would reduce these ranges to "
             f"{100.0 * share:.0f} %."
         )
+
+
+def _sides(changes: Ends) -> Sides:
+    return max(0.0, -min(changes)), max(0.0, *changes)
+
+
+def estimates_alpha(case: Case) -> bool:
+    """Return True for an oil whose pressure-viscosity coefficient is estimated."""
+    sheet = case.oil_sheet
+    return case.lubricant is not None and sheet is not None and sheet.alpha is None
+
+
+def with_alpha(case: Case, state: ContactState, effect: AlphaEffect | None) -> ContactError:
+    """Return the uncertainty of a contact with the part of an estimated alpha.
+
+    That part is undetermined without its `effect`; CRF follows from CLR by the coupling's law.
+    """
+    error = state.error
+    assert error is not None  # set by contact_state
+    if not estimates_alpha(case):
+        return error
+    sides = None if effect is None else effect.clr_sides
+    crf_hz, model = error.crf_hz, case.vibration
+    if crf_hz is not None and model is not None:
+        oil = sides and crf_sides(error.clr.value, sides, state, case.conditions, model)
+        crf_hz = replace(crf_hz, oil=oil)
+    return replace(error, clr=replace(error.clr, oil=sides), crf_hz=crf_hz)
 
 
 def alpha_effect(case: Case, solution: ContactSolution) -> AlphaEffect | None:
@@ -62,10 +100,8 @@ def alpha_effect(case: Case, solution: ContactSolution) -> AlphaEffect | None:
 
     None for an alpha that is given, without oil, and where a contact does not converge.
     """
-    sheet, oil = case.oil_sheet, solution.lubricant
-    if sheet is None or sheet.alpha is not None or oil is None:
-        return None
-    if not solution.convergence.converged:
+    oil = solution.lubricant
+    if oil is None or not estimates_alpha(case) or not solution.convergence.converged:
         return None
     law = oil.viscosity
     assert isinstance(law, Barus | Roelands)  # of a data sheet

@@ -19,13 +19,10 @@ from asperity.ehl import ContactSolution, ContactState
 from asperity.resonance import Resonance
 from asperity.results.determined import Determined
 from asperity.results.dynamic import DynamicCurve, dynamic_curve
-from asperity.results.friction_interval import (
-    FrictionInterval,
-    friction_interval,
-    numerical_error,
-)
+from asperity.results.film_errors import film_errors
+from asperity.results.friction_interval import FrictionInterval, friction_interval, numerical_error
 from asperity.results.lubrication_regime import lubrication
-from asperity.results.oil_effect import AlphaEffect, alpha_effect, oil_summary
+from asperity.results.oil_effect import AlphaEffect, alpha_effect, oil_summary, with_alpha
 from asperity.results.run_contents import run_contents
 from asperity.results.running import Running
 from asperity.results.surface_spread import AVERAGED, Row, Scalar, half_interval, mean_row
@@ -240,11 +237,16 @@ class Run(Displayed):
         """Load share on films no thicker than each of `FILMS`."""
         return {f"{film * 1e9:.0f}nm": clr_below(self.solution, film) for film in FILMS}
 
-    @property
+    @cached_property
     def error(self) -> ehl.ContactError:
-        """Uncertainty of load share and resonance."""
-        assert self.state.error is not None  # set by contact_state
-        return self.state.error
+        """Uncertainty of load share and resonance: that of `state`, and of an estimated alpha."""
+        return with_alpha(self.case, self.state, self.alpha_effect)
+
+    @cached_property
+    def film_errors(self) -> dict[str, ehl.Uncertainty]:
+        """Uncertainty of the minimum and the central film thickness, over all surfaces."""
+        rows = (self.numbers(["film"]), *self.others)
+        return film_errors(self.case, rows, self.alpha_effect)
 
     @cached_property
     def own_scalars(self) -> dict[str, Scalar]:
@@ -292,8 +294,9 @@ class Run(Displayed):
     @cached_property
     def undetermined(self) -> str | None:
         """Reason why this grid does not determine CLR; None if it does."""
+        assert self.state.error is not None  # set by contact_state
         # the error bar of a running contact compares two grids
-        return undetermined(self.solution, self.error.clr, resolved=self.running is not None)
+        return undetermined(self.solution, self.state.error.clr, resolved=self.running is not None)
 
     @property
     def converged(self) -> bool:
@@ -347,17 +350,14 @@ class Run(Displayed):
 
     def summary(self) -> dict[str, object]:
         """Return the content of `solve --json`: numbers, cells, regime card, oil and notes."""
+        curve = self.dynamic_curve
         return {
             **self.scalars(),
             "roughness": "standing" if self.running is None else "running",
             "cells": list(self.solution.grid.cells),
             "regime_card": self.card.to_dict(),
             **oil_summary(self.case, self.alpha_effect, self.state),
-            **(
-                {}
-                if self.dynamic_curve is None
-                else {"dynamic_curve": self.dynamic_curve.scalars()}
-            ),
+            **({} if curve is None else {"dynamic_curve": curve.scalars()}),
             "notes": [*self.remarks, *self._without_virgin()],
         }
 

@@ -151,13 +151,7 @@ def crf_error(
     record = NORMAL_FACTOR * float(np.mean(deviations)) if len(deviations) == len(crf_hz) else None
 
     def propagated(sides: Sides | None) -> Sides | None:
-        if sides is None:
-            return None
-        values = (max(0.0, clr.value - sides[0]), clr.value, min(1.0, clr.value + sides[1]))
-        low, middle, high = (resonance_at(end, state, conditions, model) for end in values)
-        if low is None or middle is None or high is None:
-            return None
-        return abs(middle - low), abs(high - middle)
+        return None if sides is None else crf_sides(clr.value, sides, state, conditions, model)
 
     surfaces = propagated(clr.surfaces)
     if clr.surfaces is not None and surfaces is None and len(crf_hz) > 1:
@@ -170,3 +164,18 @@ def crf_error(
         record=None if record is None else (record, record),
         range=vibration.band_hz,
     )
+
+
+def crf_sides(
+    clr: float,
+    sides: Sides,
+    state: ContactState,
+    conditions: ContactConditions,
+    model: VibrationModel,
+) -> Sides | None:
+    """Propagate an error of CLR to CRF by the coupling's law; None without such a law."""
+    values = (max(0.0, clr - sides[0]), clr, min(1.0, clr + sides[1]))
+    low, middle, high = (resonance_at(end, state, conditions, model) for end in values)
+    if low is None or middle is None or high is None:
+        return None
+    return abs(middle - low), abs(high - middle)

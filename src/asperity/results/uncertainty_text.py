@@ -11,12 +11,14 @@ PARTS = {  # part of an uncertainty: name in tables
     "grid": "cell size",
     "surfaces": "surface to surface",
     "record": "record length",
+    "oil": "pressure-viscosity coefficient",
 }
 UNDETERMINED = "not determined"
 REASONS = {  # reason why a part is not determined
     "iteration": "no solution to compare with",
     "grid": "no coarser grid to compare with",
     "record": "not given by the method",
+    "oil": "no solution at the ends of its interval",
 }
 
 
@@ -84,7 +86,7 @@ def _rows(entry: Quantity, error: Uncertainty, whole: ContactError) -> list[tupl
             text = "unknown (one surface solved)" if whole.surfaces == 1 else UNDETERMINED
         elif sides is None:
             text = f"{UNDETERMINED} ({REASONS[part]})"
-        elif sides == (0.0, 0.0) and part == "record":
+        elif sides == (0.0, 0.0) and part in ("record", "oil"):
             continue
         else:
             text = _sides(entry, sides)

@@ -1,0 +1,46 @@
+"""Uncertainty of the film thicknesses of a solved case, by part."""
+
+import math
+from collections.abc import Sequence
+
+from asperity.case import Case
+from asperity.ehl import Sides, Uncertainty
+from asperity.results.oil_effect import AlphaEffect, estimates_alpha
+from asperity.results.surface_spread import Row, mean_row, prediction_interval
+
+NAMES = ("h_min", "h_central")
+
+
+def film_errors(
+    case: Case, rows: Sequence[Row], effect: AlphaEffect | None
+) -> dict[str, Uncertainty]:
+    """Return the uncertainty of every film by name, from the numbers of all surfaces [m].
+
+    `grid` contains the error of iteration and, of a running contact, of the finite time. The part
+    of an estimated pressure-viscosity coefficient is undetermined without its `effect`.
+    """
+    means = mean_row(rows)
+    return {name: _film_error(case, means, rows, effect, name) for name in NAMES}
+
+
+def _film_error(
+    case: Case, means: Row, rows: Sequence[Row], effect: AlphaEffect | None, name: str
+) -> Uncertainty:
+    key = f"{name}_m"
+    value, numerical = float(means[key] or 0.0), means[f"{name}_error_m"]
+    surfaces: Sides | None = None
+    if len(rows) > 1:
+        values = [float(row[key] or 0.0) for row in rows]
+        surfaces = prediction_interval(values, share=False)[1]
+    oil: Sides | None = (0.0, 0.0)
+    if estimates_alpha(case):
+        below, above = (None, None) if effect is None else effect.film_sides(key)
+        oil = None if below is None or above is None else (value * below, value * above)
+    return Uncertainty(
+        value=value,
+        iteration=(0.0, 0.0),
+        grid=None if numerical is None else (float(numerical), float(numerical)),
+        surfaces=surfaces,
+        oil=oil,
+        range=(0.0, math.inf),
+    )
