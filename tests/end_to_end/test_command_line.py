@@ -63,6 +63,7 @@ KEYS = [
     ),
     *("contact_stiffness_virgin_n_m", "contact_damping_ratio_virgin"),
     *("clr_low", "clr_high", "crf_low_hz", "crf_high_hz", "surfaces"),
+    *(f"{film}_{end}_m" for film in ("h_min", "h_central") for end in ("low", "high")),
     *("clr_surfaces_error", "crf_error_hz", "crf_surfaces_error_hz", "crf_record_error_hz"),
     *("snapshot_clr", "clr_std", "roughness", "verdict"),
 ]

@@ -40,6 +40,7 @@ SOLVED = [  # from the same section, with further keys of a solved contact
     ),
     *("h_min_m", "determined", "p_max_pa", "friction_power_w"),
     *("rolling_friction_power_w", "von_mises_core_pa", "reason"),
+    *(f"{film}_{end}_m" for film in ("h_min", "h_central") for end in ("low", "high")),
     *("clr_low", "clr_high", "crf_low_hz", "crf_high_hz", "surfaces"),
 ]
 RATING = ["beyond", "formula", "key", "reason", "standard", "validity"]

@@ -13,8 +13,8 @@ NAMES = ("h_min", "h_central")
 
 def film_errors(
     case: Case, rows: Sequence[Row], effect: AlphaEffect | None
-) -> dict[str, Uncertainty]:
-    """Return the uncertainty of every film by name, from the numbers of all surfaces [m].
+) -> dict[str, Uncertainty | None]:
+    """Return the uncertainty of every film by name [m]; None for one not known of all surfaces.
 
     `grid` contains the error of iteration and, of a running contact, of the finite time. The part
     of an estimated pressure-viscosity coefficient is undetermined without its `effect`.
@@ -25,9 +25,11 @@ def film_errors(
 
 def _film_error(
     case: Case, means: Row, rows: Sequence[Row], effect: AlphaEffect | None, name: str
-) -> Uncertainty:
+) -> Uncertainty | None:
     key = f"{name}_m"
-    value, numerical = float(means[key] or 0.0), means[f"{name}_error_m"]
+    if means[key] is None:
+        return None
+    value, numerical = float(means[key]), means[f"{name}_error_m"]
     surfaces: Sides | None = None
     if len(rows) > 1:
         values = [float(row[key] or 0.0) for row in rows]

@@ -243,7 +243,7 @@ class Run(Displayed):
         return with_alpha(self.case, self.state, self.alpha_effect)
 
     @cached_property
-    def film_errors(self) -> dict[str, ehl.Uncertainty]:
+    def film_errors(self) -> dict[str, ehl.Uncertainty | None]:
         """Uncertainty of the minimum and the central film thickness, over all surfaces."""
         rows = (self.numbers(["film"]), *self.others)
         return film_errors(self.case, rows, self.alpha_effect)
