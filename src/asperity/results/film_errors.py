@@ -27,19 +27,19 @@ def _film_error(
     case: Case, means: Row, rows: Sequence[Row], effect: AlphaEffect | None, name: str
 ) -> Uncertainty | None:
     key = f"{name}_m"
-    if means[key] is None:
+    value, numerical = means[key], means[f"{name}_error_m"]
+    if value is None:
         return None
-    value, numerical = float(means[key]), means[f"{name}_error_m"]
     surfaces: Sides | None = None
     if len(rows) > 1:
         values = [float(row[key] or 0.0) for row in rows]
         surfaces = prediction_interval(values, share=False)[1]
     oil: Sides | None = (0.0, 0.0)
     if estimates_alpha(case):
-        below, above = (None, None) if effect is None else effect.film_sides(key)
-        oil = None if below is None or above is None else (value * below, value * above)
+        sides = None if effect is None else effect.film_sides(key)
+        oil = sides and (value * sides[0], value * sides[1])
     return Uncertainty(
-        value=value,
+        value=float(value),
         iteration=(0.0, 0.0),
         grid=None if numerical is None else (float(numerical), float(numerical)),
         surfaces=surfaces,
