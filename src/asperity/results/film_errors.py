@@ -8,8 +8,6 @@ from asperity.ehl import Sides, Uncertainty
 from asperity.results.oil_effect import AlphaEffect, estimates_alpha
 from asperity.results.surface_spread import Row, mean_row, prediction_interval
 
-NAMES = ("h_min", "h_central")
-
 
 def film_errors(
     case: Case, rows: Sequence[Row], effect: AlphaEffect | None
@@ -20,7 +18,7 @@ def film_errors(
     of an estimated pressure-viscosity coefficient is undetermined without its `effect`.
     """
     means = mean_row(rows)
-    return {name: _film_error(case, means, rows, effect, name) for name in NAMES}
+    return {name: _film_error(case, means, rows, effect, name) for name in ("h_min", "h_central")}
 
 
 def _film_error(
