@@ -65,6 +65,8 @@ KEYS = [
     *("clr_low", "clr_high", "crf_low_hz", "crf_high_hz", "surfaces"),
     *(f"{film}_{end}_m" for film in ("h_min", "h_central") for end in ("low", "high")),
     *("clr_surfaces_error", "crf_error_hz", "crf_surfaces_error_hz", "crf_record_error_hz"),
+    *("capacitance_f", "zone_capacitance_f", "contact_resistance_ohm"),
+    *("ultrasonic_reflection", "interface_stiffness_n_m3"),
     *("snapshot_clr", "clr_std", "roughness", "verdict"),
 ]
 

@@ -16,6 +16,8 @@ from asperity.core.quantities import (
 from asperity.surface import ProfileParameters, SurfaceParameters
 
 SCALED = (
+    "F",
+    "ohm",
     "1",
     "m",
     "m/s",

@@ -748,7 +748,7 @@ def test_pure_rolling_and_failed_friction_are_stated(monkeypatch):
     def refuse(*_, **__):
         raise AsperityError("friction and temperature did not converge")
 
-    monkeypatch.setattr("asperity.results.run.friction_and_heat", refuse)
+    monkeypatch.setattr("asperity.results.derived.friction_and_heat", refuse)
     failed = Page(page.render_page([run_like()]))
     assert "No friction and temperature figures: friction and temperature did not" in failed.text
     assert next(row[1] for row in failed.rows if row[0].startswith("Friction coefficient")) == "–"

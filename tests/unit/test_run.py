@@ -207,7 +207,7 @@ def test_a_friction_failure_keeps_all_other_results(run, monkeypatch):
     def refuse(*_, **__):
         raise AsperityError("friction and temperature did not converge")
 
-    monkeypatch.setattr(results, "friction_and_heat", refuse)
+    monkeypatch.setattr("asperity.results.derived.friction_and_heat", refuse)
     failed_run = Run(case=run.case, solution=run.solution, state=run.state, vibration=None)
     scalars = failed_run.scalars()
     assert scalars["friction_coefficient"] is scalars["flash_temperature_max_k"] is None

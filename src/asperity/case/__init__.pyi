@@ -23,6 +23,7 @@ from .sections import ContactSection as ContactSection
 from .sections import GridSection as GridSection
 from .sections import MotionSection as MotionSection
 from .sections import SolverSection as SolverSection
+from .sensing import SensingSection as SensingSection
 from .study import RangeSection as RangeSection
 from .study import Seeding as Seeding
 from .study import StudyKind as StudyKind

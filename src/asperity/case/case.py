@@ -12,7 +12,7 @@ from pathlib import Path
 from asperity.case.lubricant import SheetSection
 from asperity.case.messages import parse_section
 from asperity.case.roughness_scale import texture_of
-from asperity.case.sections import CaseFile, MotionSection
+from asperity.case.sections import CaseFile, MotionSection, require_beyond_contact
 from asperity.case.surfaces import FileSection, composite_roughness, moving_roughness, two_bodies
 from asperity.case.text import parse_toml, read_text, replaced, restated
 from asperity.case.units import numbers_in_si, plain
@@ -25,7 +25,7 @@ from asperity.core.limits import require_affordable
 from asperity.coupling import VibrationModel
 from asperity.ehl import ACCURACY, MOST_RUNNING_CELLS, Options, auto_grid, running_cells
 from asperity.lubricant import Lubricant, OilFact, OilSheet, Thermal
-from asperity.solution import inlet_notes, plausibility_notes
+from asperity.solution import Sensing, inlet_notes, plausibility_notes
 from asperity.surface import CompositeSurface, MovingSurfaces, Surface, track_grid
 from asperity.wear import WearModel
 
@@ -59,13 +59,18 @@ class Case(Brief):
 
     def __post_init__(self) -> None:
         # report errors now rather than after a long computation
-        # an automatic grid of a measured surface would need its file
-        measured = any(
-            isinstance(part, FileSection) for part in self.contents.surface.parts.values()
-        )
-        for name in ("conditions", "lubricant", "grid", "options", "thermal", "vibration", "wear"):
-            if name == "grid" and measured and self.contents.grid.chosen:
-                continue
+        for name in (
+            "conditions",
+            "lubricant",
+            "grid",
+            "options",
+            "thermal",
+            "sensing",
+            "vibration",
+            "wear",
+        ):
+            if name == "grid" and self._is_measured and self.contents.grid.chosen:
+                continue  # would need its file
             with self.naming(
                 {"conditions": "contact and material", "options": "solver"}.get(name, name)
             ):
@@ -139,6 +144,12 @@ class Case(Brief):
         return self.contents.thermal.thermal(None if self._sheet is None else self._sheet.supply())
 
     @cached_property
+    def sensing(self) -> Sensing:
+        """Electrical and acoustic properties."""
+        section = self.contents.sensing
+        return Sensing() if section is None else section.sensing()
+
+    @cached_property
     def grid(self) -> Grid:
         """Computing grid [m]; `auto_grid` chooses what the case omits.
 
@@ -170,9 +181,9 @@ class Case(Brief):
                 y=y,
                 cells=None if section.cells == "auto" else section.cells,
             )
-        _require_beyond_contact("x", section.x, "-4.5 to 1.9")
+        require_beyond_contact("x", section.x, "-4.5 to 1.9")
         if not line:
-            _require_beyond_contact("y", section.y, "-3 to 3")
+            require_beyond_contact("y", section.y, "-3 to 3")
         _require_affordable(grid)
         return grid
 
@@ -333,8 +344,7 @@ class Case(Brief):
 
     @property
     def _is_measured(self) -> bool:
-        parts = self.contents.surface.parts.values()
-        return any(isinstance(part, FileSection) for part in parts)
+        return any(isinstance(p, FileSection) for p in self.contents.surface.parts.values())
 
     @property
     def _default_surfaces(self) -> int:
@@ -345,9 +355,8 @@ class Case(Brief):
 
     def on_surface(self, number: int) -> "Case":
         """Return the case on another surface: a later seed or map position; 0 is its own."""
-        return (
-            self.with_written(self.contents.surface.variant_overrides(number)) if number else self
-        )
+        overrides = self.contents.surface.variant_overrides(number)
+        return self.with_written(overrides) if number else self
 
     @property
     def surface_notes(self) -> tuple[str, ...]:
@@ -388,14 +397,6 @@ class Case(Brief):
         case = Case(parse_section(CaseFile, tables, self.source), self.folder, self.source)
         same = case.grid == self.grid and case.contents.surface == self.contents.surface
         return replace(case, stored=self.stored, stored_notes=self.stored_notes) if same else case
-
-
-def _require_beyond_contact(axis: str, limits: tuple[float, float] | None, usual: str) -> None:
-    if limits is not None and not (limits[0] < -1.0 and limits[1] > 1.0):
-        raise BadInput(
-            f"{axis} must reach beyond the contact on both sides, got {limits[0]:g} to "
-            f"{limits[1]:g} half-widths; use {usual}, or leave it out"
-        )
 
 
 def _require_affordable(grid: Grid) -> None:

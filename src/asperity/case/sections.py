@@ -11,6 +11,7 @@ from asperity.case.lubricant import SheetSection, parse_lubricant
 from asperity.case.materials import MaterialSection, with_named_solids
 from asperity.case.messages import LocatedError, Section, quoted
 from asperity.case.roller_shape import ShapeSection
+from asperity.case.sensing import SensingSection
 from asperity.case.study import StudySection, parse_study
 from asperity.case.surfaces import RoughBody, SurfaceSection, parse_surface
 from asperity.case.units import (
@@ -93,6 +94,15 @@ class GridSection(Section):
         return self.cells == "auto" or self.x is None or self.y is None
 
 
+def require_beyond_contact(axis: str, limits: tuple[float, float] | None, usual: str) -> None:
+    """Raise BadInput for the ends of an axis [half-widths] that lie inside the contact."""
+    if limits is not None and not (limits[0] < -1.0 and limits[1] > 1.0):
+        raise BadInput(
+            f"{axis} must reach beyond the contact on both sides, got {limits[0]:g} to "
+            f"{limits[1]:g} half-widths; use {usual}, or leave it out"
+        )
+
+
 class SolverSection(Section):
     """[solver]: numerical settings."""
 
@@ -141,6 +151,7 @@ class CaseFile(Section):
     grid: GridSection = GridSection()
     solver: SolverSection = SolverSection()
     thermal: ThermalSection = Field(default_factory=ThermalSection)
+    sensing: Annotated[SensingSection | None, OPTIONAL] = None
     vibration: Annotated[Any, PlainValidator(parse_vibration)] = None
     study: Annotated[StudySection | None, PlainValidator(parse_study)] = None
     motion: Annotated[MotionSection | None, OPTIONAL] = None

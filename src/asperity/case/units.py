@@ -42,6 +42,8 @@ _MEASURES = {  # SI unit -> quantity, and an example
     "rad": ("an angle", "20 deg"),
     "N m": ("a torque", "265 N m"),
     "N/m": ("a stiffness", "30 N/mm"),
+    "ohm m": ("a resistivity", "0.22 uohm m"),
+    "ohm m^2": ("a resistance times an area", "1 nohm m^2"),
     "J/mol": ("a molar energy", "49 kJ/mol"),
 }
 _TURN = Decimal("6.283185307179586476925286766559")  # 2 pi

@@ -37,6 +37,8 @@ _FACTORS = {
     "kHz": 1e-3,
     "MPa": 1e-6,
     "GPa": 1e-9,
+    "pF": 1e12,
+    "mΩ": 1e3,
 }
 _FACTORS |= {
     "1/µm": 1e-6,

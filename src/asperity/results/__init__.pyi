@@ -4,6 +4,7 @@ from .curves import FrictionPoint as FrictionPoint
 from .curves import SolverProgress as SolverProgress
 from .curves import stribeck_curve as stribeck_curve
 from .curves import traction_curve as traction_curve
+from .derived import Derived as Derived
 from .dynamic import FREQUENCIES as FREQUENCIES
 from .dynamic import DynamicBranch as DynamicBranch
 from .dynamic import DynamicCurve as DynamicCurve

@@ -10,13 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from asperity import ehl
-from asperity.case import Case
 from asperity.core.displayed import Displayed
-from asperity.core.errors import BadInput
 from asperity.core.quantities import Quantity, lines, quantity, read
 from asperity.coupling import Vibration
-from asperity.ehl import ContactSolution, ContactState
 from asperity.resonance import Resonance
+from asperity.results.derived import Derived
 from asperity.results.determined import Determined
 from asperity.results.dynamic import DynamicCurve, dynamic_curve
 from asperity.results.film_errors import film_errors
@@ -28,24 +26,13 @@ from asperity.results.running import Running
 from asperity.results.surface_spread import AVERAGED, Row, Scalar, half_interval, mean_row
 from asperity.results.uncertainty_text import basis, ends_text, interval_text
 from asperity.solution import (
-    FILMS,
     HOT,
-    AxialDistribution,
     DynamicStiffness,
-    FlashTemperature,
-    Friction,
-    LoadSharing,
     OwnResonance,
     RegimeCard,
-    SubsurfaceStress,
-    axial_distribution,
-    clr_below,
-    friction_and_heat,
     own_resonance,
     regime_card,
-    sharing_by_film,
     solved_inlet,
-    subsurface_stress,
     uncertain_films,
     undetermined,
 )
@@ -68,7 +55,7 @@ SUMMARY_KEYS = ("clr", "clr_error", "car", *ROUGHNESS_KEYS, "crf_hz", "crf_std_h
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Run(Displayed):
+class Run(Derived, Displayed):
     """Solved case: the contact, its derived quantities, and the vibration of a mass on it.
 
     `vibration` is None for a case without [vibration]; `notes` qualify the numbers. Friction, heat
@@ -82,31 +69,11 @@ class Run(Displayed):
     last moment, without own resonance, if that did not converge.
     """
 
-    case: Case
-    solution: ContactSolution
-    state: ContactState
     vibration: Vibration | None
     notes: tuple[str, ...] = ()
     others: tuple[Row, ...] = ()
     groups: tuple[str, ...] = RUN_GROUPS
     running: Running | None = None
-
-    @cached_property
-    def _friction_and_heat(self) -> Determined[tuple[Friction, FlashTemperature]]:
-        """Friction and heat, if determined."""
-        case = self.case
-        return Determined.attempt(
-            lambda: friction_and_heat(
-                self.solution, boundary_friction=case.boundary_friction, thermal=case.thermal
-            ),
-            reraise=(BadInput,),
-        )
-
-    @property
-    def friction(self) -> Friction | None:
-        """Friction with the case's boundary friction, oil and [thermal]; None if it failed."""
-        determined = self._friction_and_heat.value
-        return None if determined is None else determined[0]
 
     @property
     def friction_error(self) -> float | None:
@@ -119,12 +86,6 @@ class Run(Displayed):
     def friction_interval(self) -> FrictionInterval | None:
         """Interval of friction over all surfaces; None if it was not computed."""
         return friction_interval((self.own_scalars, *self.others))
-
-    @property
-    def heat(self) -> FlashTemperature | None:
-        """Temperatures due to friction; None without friction."""
-        determined = self._friction_and_heat.value
-        return None if determined is None else determined[1]
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -149,18 +110,6 @@ class Run(Displayed):
             "cold oil: friction and temperatures are too high. Set thermal.feedback=true."
         )
         return (*notes, hot_film)
-
-    @property
-    def friction_failure(self) -> str | None:
-        """Reason why friction and heat are not available; None if they are."""
-        return self._friction_and_heat.reason or None
-
-    @cached_property
-    def stress(self) -> SubsurfaceStress:
-        """Stresses in body 1 under the solved pressure and the traction of friction."""
-        return subsurface_stress(
-            self.solution, shear=None if self.friction is None else self.friction.shear
-        )
 
     @property
     def resonance(self) -> Resonance | None:
@@ -228,16 +177,6 @@ class Run(Displayed):
         return half_interval(values) if len(values) > 1 else None
 
     @cached_property
-    def sharing(self) -> LoadSharing:
-        """Load shares by film thickness."""
-        return sharing_by_film(self.solution)
-
-    @property
-    def load_below(self) -> dict[str, float]:
-        """Load share on films no thicker than each of `FILMS`."""
-        return {f"{film * 1e9:.0f}nm": clr_below(self.solution, film) for film in FILMS}
-
-    @cached_property
     def error(self) -> ehl.ContactError:
         """Uncertainty of load share and resonance: that of `state`, and of an estimated alpha."""
         return with_alpha(self.case, self.state, self.alpha_effect)
@@ -263,11 +202,6 @@ class Run(Displayed):
         means = {} if self.running is None else self.running.numbers
         numbers = read(self, [entry for entry in entries if entry.key not in means])
         return {entry.key: means.get(entry.key, numbers.get(entry.key)) for entry in entries}
-
-    @cached_property
-    def axial(self) -> AxialDistribution | None:
-        """Distributions along a roller; None for another geometry."""
-        return axial_distribution(self.solution)
 
     def scalars(self) -> dict[str, Scalar]:
         """Return all numbers of the run by key, SI: means over surfaces, intervals, solver data."""

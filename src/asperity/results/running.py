@@ -27,20 +27,13 @@ from asperity.ehl import (
     half_as_many,
     least_film,
 )
+from asperity.results.derived import Derived
 from asperity.results.determined import Determined
 from asperity.results.surface_spread import Row, Scalar, crf_error
 from asperity.solution import (
-    FILMS,
-    FlashTemperature,
     Friction,
-    LoadSharing,
-    SubsurfaceStress,
-    clr_below,
     friction,
-    friction_and_heat,
     inlet_viscosity_factor,
-    sharing_by_film,
-    subsurface_stress,
 )
 from asperity.surface import MovingSurfaces
 from asperity.transient import (
@@ -55,7 +48,7 @@ from asperity.transient import (
 
 MOMENTS = 4  # at which heat and stress are evaluated
 EVERY_STEP = ("load", "film", "pressure", "friction")  # groups of the catalogue: at every step
-AT_MOMENTS = ("sharing", "heat", "stress")  # ... at some
+AT_MOMENTS = ("sharing", "heat", "stress", "observables")  # ... at some
 WITHOUT = ("_error", "_error_m")  # keys of error bars, which the grids determine
 MOST_TRACK_LENGTHS = 16  # of a generated track, in lengths of the domain
 MAX_FAILED = 0.02  # share of the time steps that may miss the tolerance
@@ -134,25 +127,12 @@ class TrackProgress(NamedTuple):
 NO_PROGRESS = TrackProgress()
 
 
-@dataclass(frozen=True, slots=True)
-class _Sources:
+class _Step(NamedTuple):
     """Attributes of a step that the catalogue's sources refer to."""
 
     state: ContactState
     solution: ContactSolution
-    friction: Friction | None = None
-    heat: FlashTemperature | None = None
-    stress: SubsurfaceStress | None = None
-
-    @property
-    def sharing(self) -> LoadSharing:
-        """Load shares by film thickness."""
-        return sharing_by_film(self.solution)
-
-    @property
-    def load_below(self) -> dict[str, float]:
-        """Load share on films no thicker than each of `FILMS`."""
-        return {f"{film * 1e9:.0f}nm": clr_below(self.solution, film) for film in FILMS}
+    friction: Friction
 
 
 def mean_state(state: ContactState, running: Running) -> ContactState:
@@ -328,7 +308,7 @@ def _track(
         rubbing = friction(
             snapshot.solution, boundary_friction=case.boundary_friction, thermal=case.thermal
         )
-        numbers = read(_Sources(snapshot.state, snapshot.solution, rubbing), entries)
+        numbers = read(_Step(snapshot.state, snapshot.solution, rubbing), entries)
         values = {key: math.nan if value is None else value for key, value in numbers.items()}
         return {"time_s": snapshot.time, **values, **snapshot.rolling_friction}
 
@@ -386,13 +366,8 @@ def _numbers(case: Case, means: dict[str, TimeMean], moments: list[Snapshot]) ->
 
 def _at_moment(case: Case, snapshot: Snapshot) -> dict[str, Scalar]:
     """Return the numbers that are evaluated at some moments only."""
-    solution = snapshot.solution
-    rubbing, heat = friction_and_heat(
-        solution, boundary_friction=case.boundary_friction, thermal=case.thermal
-    )
-    stress = subsurface_stress(solution, shear=rubbing.shear)
-    sources = _Sources(snapshot.state, solution, rubbing, heat, stress)
-    return read(sources, _entries(AT_MOMENTS))
+    moment = Derived(case=case, solution=snapshot.solution, state=snapshot.state)
+    return read(moment, _entries(AT_MOMENTS))
 
 
 _Outcome = Callable[[], Determined[Series]]

@@ -31,6 +31,7 @@ AVERAGED = (
     "friction",
     "heat",
     "stress",
+    "observables",
     "resonance",
     "own",
     "virgin",

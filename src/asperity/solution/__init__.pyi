@@ -17,6 +17,8 @@ from .load_sharing import FILMS as FILMS
 from .load_sharing import LoadSharing as LoadSharing
 from .load_sharing import clr_below as clr_below
 from .load_sharing import sharing_by_film as sharing_by_film
+from .observation import Observables as Observables
+from .observation import observables as observables
 from .plausibility import inlet_notes as inlet_notes
 from .plausibility import plausibility_notes as plausibility_notes
 from .plausibility import solution_notes as solution_notes
@@ -25,6 +27,7 @@ from .plausibility import undetermined as undetermined
 from .regime import FittedFilm as FittedFilm
 from .regime import RegimeCard as RegimeCard
 from .regime import regime_card as regime_card
+from .sensing import Sensing as Sensing
 from .state import contact_state as contact_state
 from .state import plastic_overlap as plastic_overlap
 from .stiffness import TangentStiffness as TangentStiffness

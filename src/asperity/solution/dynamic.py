@@ -22,7 +22,15 @@ from asperity.ehl.linear_solvers.oscillating import (
 )
 from asperity.ehl.outcome import CONSERVING
 from asperity.solution.state import balance_of
-from asperity.solution.stiffness import ELASTIC, FLOWING, YIELDED, Yielded, checked_depth
+from asperity.solution.stiffness import (
+    ELASTIC,
+    FLOWING,
+    YIELDED,
+    Yielded,
+    at_depth,
+    checked_depth,
+    stiffness_scale,
+)
 
 # Relative residuals of the linear equations:
 TOLERANCE = 1e-5  # stiffness to 1e-4, a damping ratio of 0.001 to 1 %
@@ -148,7 +156,8 @@ class OscillatingContact:
 
     def _response(self, pressure_sum: complex) -> complex:
         """Return k + iωc [N/m] from the sum of the dimensionless pressures per approach."""
-        return self._at_reference(pressure_sum * self._stiffness_scale())
+        scale = stiffness_scale(self.conditions, self.balance.problem, self.scales)
+        return at_depth(self.conditions, pressure_sum * scale, self.depth)
 
     def dimensionless_frequency(self, frequency_hz: float) -> float:
         """Return the angular frequency times the oil's transit time over a half-width."""
@@ -227,29 +236,6 @@ class OscillatingContact:
         length = conditions.line_length
         depth = length if self.depth is None else self.depth  # for a roller its length
         return line_stiffness(conditions.load, length, radius, modulus, depth)
-
-    def _stiffness_scale(self) -> float:
-        """Return the factor from dimensionless to physical stiffness [N/m]."""
-        problem = self.balance.problem
-        scales = self.scales
-        conditions = self.conditions
-        dx, dy = problem.spacing
-        cell = scales.pressure * scales.length**2 / scales.gap * dx * dy
-        if not conditions.endless or conditions.length is None:
-            return cell
-        return cell * conditions.length / (problem.cells[1] * dy * scales.length)
-
-    def _at_reference(self, response: complex) -> complex:
-        """Convert from points one half-width away (the solver's reference) to `depth`."""
-        conditions = self.conditions
-        if self.depth is None or conditions.length is None:
-            return response
-        modulus = conditions.pair.reduced_modulus
-        a = conditions.hertz.half_widths[0]
-        return 1.0 / (
-            1.0 / response
-            + 2.0 / (math.pi * modulus * conditions.length) * math.log(self.depth / a)
-        )
 
 
 @dataclass(frozen=True, kw_only=True)

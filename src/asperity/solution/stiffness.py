@@ -13,7 +13,8 @@ import numpy as np
 
 from asperity.contact.conditions import ContactConditions
 from asperity.core.errors import BadInput, require_positive
-from asperity.ehl import ContactSolution, solve_contact
+from asperity.ehl import ContactSolution, Scales, solve_contact
+from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.outcome import CONSERVING
 from asperity.solution.state import plastic_overlap
 
@@ -138,6 +139,27 @@ def roller_depth(conditions: ContactConditions) -> float:
     5.57-5.58.
     """
     return 2.0 * conditions.radius_along_rolling / math.e
+
+
+def stiffness_scale(conditions: ContactConditions, problem: Problem, scales: Scales) -> float:
+    """Return the factor from a dimensionless pressure sum per approach to a stiffness [N/m]."""
+    dx, dy = problem.spacing
+    cell = scales.pressure * scales.length**2 / scales.gap * dx * dy
+    if not conditions.endless or conditions.length is None:
+        return cell
+    return cell * conditions.length / (problem.cells[1] * dy * scales.length)
+
+
+def at_depth(conditions: ContactConditions, stiffness: complex, depth: float | None) -> complex:
+    """Convert a line contact's stiffness [N/m] from the solver's reference to points `depth` away.
+
+    The solver refers it to points one half-width away; others (depth None) refer to infinity.
+    """
+    if depth is None or conditions.length is None:
+        return stiffness
+    distance = math.log(depth / conditions.hertz.half_widths[0])
+    spread = 2.0 / (math.pi * conditions.pair.reduced_modulus * conditions.length)
+    return 1.0 / (1.0 / stiffness + spread * distance)
 
 
 def _central_difference(
