@@ -16,7 +16,7 @@ from asperity.simulation.wear.notes import few_jumps_note, grooves_note, radii_n
 from asperity.simulation.wear.rows import body_column, contact_row, roughness
 from asperity.simulation.wear.run import _row
 from asperity.simulation.wear.state import WearState
-from asperity.solution import Friction
+from asperity.solution import Friction, Observables, Sensing
 from asperity.surface import Surface
 from asperity.wear import TrackPosition
 from asperity.wear.laws import GAS_CONSTANT
@@ -37,6 +37,17 @@ STATE = ContactState(
     reynolds_residual=0.0,
     load_error=0.0,
     mass_flux_imbalance=0.0,
+)
+
+
+OBSERVABLES = Observables(
+    capacitance=1e-10,
+    zone_capacitance=5e-11,
+    contact_resistance=None,
+    film_stiffness=1e16,
+    interface_stiffness=1e16,
+    impedances=(4.6e7, 4.6e7),
+    sensing=Sensing(),
 )
 
 
@@ -64,9 +75,22 @@ def loaded_position(
         state=STATE,
         friction=Friction(**{field.name: 0.1 for field in fields(Friction)}),
         flash_temperature=temperature_rise,
+        observables=OBSERVABLES,
         at_edge=False,
     )
     return [(TrackPosition(0, 0), solved)]
+
+
+def test_observables_are_means_over_the_positions():
+    model = wearing_contact()
+    ((_, solved),) = loaded_position(model)
+    touching = replace(OBSERVABLES, capacitance=3e-10, contact_resistance=2e-3)
+    other = replace(solved, observables=touching)
+    row = contact_row(model.case, [solved, other], 1e-6)
+    assert row["capacitance_f"] == pytest.approx(2e-10)
+    assert row["contact_resistance_ohm"] == pytest.approx(2e-3)
+    assert math.isnan(contact_row(model.case, [solved], 1e-6)["contact_resistance_ohm"])
+    assert 0.0 < row["ultrasonic_reflection"] < 1.0
 
 
 def test_the_effective_coefficient_limits_the_jump():

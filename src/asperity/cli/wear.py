@@ -56,6 +56,7 @@ CONTACT = (
     "flash_temperature_max_k",
     "crf_hz",
     "crfa",
+    "capacitance_f",
 )
 BODY_COLUMNS = (
     "overrollings",

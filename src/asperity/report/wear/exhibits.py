@@ -31,6 +31,7 @@ PANELS: Sequence[tuple[str, tuple[str, ...]]] = (  # quantity of the axis, and o
     ("flash_temperature_max_k", ("flash_temperature_max_k",)),
     ("worn_depth_m", ("worn_depth_1_m", "worn_depth_2_m")),
     ("crfa", ("crfa",)),
+    ("capacitance_f", ("capacitance_f",)),
 )
 MAX_LABEL = 24  # characters of a line of a panel's axis label
 NAMES = ("First body", "Second body")

@@ -24,10 +24,13 @@ from asperity.ehl import ContactSolution, ContactState, Options
 from asperity.lubricant import Lubricant, Thermal
 from asperity.solution import (
     Friction,
+    Observables,
+    Sensing,
     contact_state,
     friction,
     friction_and_heat,
     inlet_viscosity_factor,
+    observables,
     plastic_overlap,
     solve_thermal_contact,
 )
@@ -58,6 +61,7 @@ class SolvedPosition:
     state: ContactState
     friction: Friction
     flash_temperature: float
+    observables: Observables
     at_edge: bool
 
 
@@ -76,6 +80,7 @@ class PositionSolver:
     lubricant: Lubricant | None
     options: Options
     thermal: Thermal
+    sensing: Sensing
     boundary_friction: float
     flattening: bool
     running: bool
@@ -88,6 +93,7 @@ class PositionSolver:
             lubricant=case.lubricant,
             options=case.options,
             thermal=case.thermal,
+            sensing=case.sensing,
             boundary_friction=case.boundary_friction,
             flattening=flattening,
             running=case.is_running,
@@ -163,12 +169,13 @@ class PositionSolver:
         asperity_pressure = np.where(solution.in_contact, np.maximum(solution.pressure, 0.0), 0.0)
         rubbing: Friction | None = None
         temperatures, flash = None, np.nan
+        rise: Field | float = 0.0
         try:
             rubbing, heat = friction_and_heat(
                 solution, boundary_friction=self.boundary_friction, thermal=self.thermal
             )
             temperatures = (heat.surface_1, heat.surface_2)
-            flash = heat.max_k
+            flash, rise = heat.max_k, heat.film
         except AsperityError:  # the contact is valid without temperatures
             rubbing = rubbing or friction(solution, boundary_friction=self.boundary_friction)
         endless = self.conditions.endless
@@ -182,6 +189,7 @@ class PositionSolver:
             state=contact_state(solution),
             friction=rubbing,
             flash_temperature=flash,
+            observables=observables(solution, self.sensing, thermal=self.thermal, film_rise=rise),
             # a scar as wide as the grid; cells at the rim carry no load
             at_edge=not endless and bool(asperity_pressure[:, [1, -2]].any()),
         )

@@ -123,6 +123,7 @@ def contact_row(case: Case, solved: Sequence[SolvedPosition], sq: float) -> Row:
         "clr_mean_high": of_mean[1] if len(shares) > 1 else math.nan,
         **_friction(solved),
         "flash_temperature_max_k": max(flashes) if all(map(math.isfinite, flashes)) else math.nan,
+        **_observables(solved),
     }
     return row | _resonance(case, row, std)
 
@@ -145,6 +146,17 @@ def _friction(solved: Sequence[SolvedPosition]) -> Row:
     assert high is not None
     ends = {"friction_coefficient_low": low, "friction_coefficient_high": high}
     return {"friction_coefficient": interval.value, **ends}
+
+
+def _observables(solved: Sequence[SolvedPosition]) -> Row:
+    """Return the means of what sensors observe; the resistance is that of positions that touch."""
+    seen = [position.observables for position in solved]
+    resistances = [o.contact_resistance for o in seen if o.contact_resistance is not None]
+    return {
+        "capacitance_f": float(np.mean([o.capacitance for o in seen])),
+        "contact_resistance_ohm": float(np.mean(resistances)) if resistances else math.nan,
+        "ultrasonic_reflection": float(np.mean([o.ultrasonic_reflection for o in seen])),
+    }
 
 
 def _mean_state(solved: Sequence[SolvedPosition]) -> Row:
