@@ -44,7 +44,6 @@ OBSERVABLES = Observables(
     capacitance=1e-10,
     zone_capacitance=5e-11,
     contact_resistance=None,
-    film_stiffness=1e16,
     interface_stiffness=1e16,
     impedances=(4.6e7, 4.6e7),
     sensing=Sensing(),

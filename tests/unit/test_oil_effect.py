@@ -34,7 +34,7 @@ def test_the_film_of_a_smooth_contact_scales_with_about_the_root_of_alpha():
     given = {"lubricant.alpha": (1.0 + error) * FILM.lubricant.viscosity.alpha}
     thicker = solve_case(FILM.with_overrides(given))
     assert thicker.alpha_effect is None
-    assert effect.ends(run.state)["h_central_m"][1] == pytest.approx(
+    assert effect.ends(run.scalars())["h_central_m"][1] == pytest.approx(
         thicker.state.h_central, rel=1e-3
     )
 
@@ -45,7 +45,7 @@ def test_a_thinner_film_carries_less_of_the_load():
     assert set(summary) == {"alpha_error", "h_central_m", "h_mean_m", "h_min_m", "clr"}
     low, high = summary["clr"]
     assert 0.0 <= high < run.state.clr < low <= 1.0
-    note = run.alpha_effect.note(run.state)
+    note = run.alpha_effect.note(run.scalars())
     assert note.startswith("Alpha is estimated, ± 16 %: at the ends")
     assert note.endswith("A measured alpha (± 10 %) would reduce these ranges to 61 %.")
 
@@ -53,7 +53,7 @@ def test_a_thinner_film_carries_less_of_the_load():
 def test_the_intervals_contain_the_effect():
     """Film and load share at both ends of alpha's interval lie within those of the result."""
     run = solve_case(ROUGH)
-    ends, numbers = run.alpha_effect.ends(run.state), run.scalars()
+    ends, numbers = run.alpha_effect.ends(run.scalars()), run.scalars()
     for key, low, high in (
         ("clr", "clr_low", "clr_high"),
         ("h_central_m", "h_central_low_m", "h_central_high_m"),

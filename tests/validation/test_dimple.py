@@ -42,8 +42,8 @@ def test_measured_films_agree_as_well_as_with_the_published_simulation(profiles)
 
 
 def test_measured_films_before_the_dimple_agree(profiles):
-    """Means from 60 µm upstream of the dimple on: 2 % in pure rolling, 5.4 % at half speed."""
-    for run, tolerance, count in (("pure rolling", 0.02, 3), ("half speed", 0.06, 2)):
+    """Means from 60 µm upstream on: 2 % in pure rolling, 5.4 % at half the mean speed."""
+    for run, tolerance, count in (("pure rolling", 0.02, 3), ("half the mean speed", 0.06, 2)):
         ratios = [profile.upstream_ratio for profile in profiles if profile.run.endswith(run)]
         known = [ratio for ratio in ratios if ratio is not None]
         assert len(known) == count

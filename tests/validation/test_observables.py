@@ -12,7 +12,9 @@ import asperity as asp
 from asperity.case import load_case
 from asperity.contact.conditions import ContactConditions, ElasticPair
 from asperity.contact.grid import Grid
+from asperity.core.errors import BadInput
 from asperity.ehl import Options, hertz_zone, solve_contact
+from asperity.lubricant import Incompressible
 from asperity.solution import Sensing, observables
 from asperity.surface import flat_surface
 from support.laplace import capacitance
@@ -118,6 +120,39 @@ def test_capacitance_does_not_depend_on_the_size_of_the_grid():
     assert found[0].capacitance == pytest.approx(found[1].capacitance, rel=0.01)
 
 
+@pytest.mark.parametrize(
+    ("ratio", "ends"), [(37.5, (1.5, 1.6)), (15.0, (1.5, 3.0)), (1.0, (1.2, 8.0))]
+)
+def test_capacitance_is_positive_around_any_grid(ratio, ends):
+    """Edges near an elongated contact, where the parabola is lower than on the far ones."""
+    right, across = ends
+    case = load_case(EXAMPLES / "ball-on-disc.toml").with_overrides(
+        {
+            "surface": "flat",
+            "vibration": "none",
+            "contact.geometry": "elliptic",
+            "contact.radius": ["4 mm", f"{4.0 * ratio} mm"],
+            "contact.load": "15 N",
+            "contact.entrainment_speed": "0.5 m/s",
+            "grid.cells": [96, 96],
+            "grid.x": [-4.5, right],
+            "grid.y": [-across, across],
+        }
+    )
+    seen = asp.solve_case(case, surfaces=1).observables
+    assert seen.capacitance > seen.zone_capacitance > 0.0
+
+
+def test_capacitance_of_dry_contact_is_limited_by_the_contact_film():
+    found = []
+    for cells in (96, 112, 160):
+        case = load_case(EXAMPLES / "ball-on-disc.toml").with_overrides(
+            {"lubricant": "none", "surface": "flat", "vibration": "none", "grid.cells": [cells] * 2}
+        )
+        found.append(asp.solve_case(case, surfaces=1).observables.capacitance)
+    assert max(found) < 1.3 * min(found)
+
+
 def test_a_rigid_ball_over_a_plane_has_the_capacitance_of_its_plates():
     solution = dry_contact(load=1e-4)
     radius, shift = 0.01, 1e-6
@@ -188,7 +223,7 @@ def test_a_film_reflects_as_a_spring(rough):
     law = rough.lubricant.density
     modulus = float(law(np.array(pressure)) / law.slope(np.array(pressure)))
     seen = observables(even)
-    assert seen.interface_stiffness == pytest.approx(modulus / film, rel=1e-9)
+    assert seen.interface_stiffness == pytest.approx(modulus / film, rel=1e-3)
     (impedance, _) = seen.impedances
     conditions = rough.conditions.pair
     e, nu = conditions.youngs_moduli[0], conditions.poisson_ratios[0]
@@ -196,8 +231,36 @@ def test_a_film_reflects_as_a_spring(rough):
     assert impedance == pytest.approx(7800.0 * speed, rel=1e-12)
     for frequency_hz in (1e6, 10e6, 100e6):
         ratio = 2.0 * modulus / film / (2.0 * math.pi * frequency_hz * impedance)
-        assert float(seen.reflection(frequency_hz)) == pytest.approx(1.0 / math.hypot(1.0, ratio))
+        assert float(seen.reflection(frequency_hz)) == pytest.approx(
+            1.0 / math.hypot(1.0, ratio), rel=1e-3
+        )
     assert seen.ultrasonic_reflection == pytest.approx(float(seen.reflection(10e6)))
+
+
+def test_the_thinnest_film_is_as_stiff_as_contact():
+    """Cells whose film closes to contact change the interface by a per cent only."""
+    case = load_case(EXAMPLES / "paper.toml").with_overrides(
+        {"contact.roughness": "standing", "grid.cells": [96, 96], "vibration": "none"}
+    )
+    solution = asp.solve_case(case, surfaces=1).solution
+    assert solution.in_contact.any()
+    film = replace(solution, in_contact=np.zeros_like(solution.in_contact))
+    stiffness = [observables(found).interface_stiffness for found in (solution, film)]
+    assert stiffness[1] == pytest.approx(stiffness[0], rel=0.05)
+
+
+def test_incompressible_oil_has_no_reflection(rough):
+    oil = replace(rough.lubricant, density=Incompressible(870.0))
+    seen = observables(replace(rough, lubricant=oil))
+    assert seen.interface_stiffness is seen.ultrasonic_reflection is None
+    with pytest.raises(BadInput, match="incompressible oil has no ultrasonic reflection"):
+        seen.reflection(1e6)
+
+
+def test_a_soft_body_reflects_everything():
+    """A Poisson's ratio of 0.5 has an infinite modulus of longitudinal waves."""
+    seen = replace(observables(dry_contact()), impedances=(math.inf, 46e6))
+    assert seen.ultrasonic_reflection == pytest.approx(1.0)
 
 
 def test_reflection_at_the_ends_of_its_range(rough):
@@ -213,6 +276,9 @@ def test_asperities_stiffen_the_interface_until_the_zone_touches():
     ball = dry_contact()
     assert observables(ball).interface_stiffness > 1e17  # touches all over the Hertz zone
     assert observables(ball).ultrasonic_reflection < 0.01
+    free = np.zeros_like(ball.in_contact)
+    open_gap = replace(ball, gap=np.full_like(ball.gap, 1e-6), in_contact=free)
+    assert observables(open_gap).ultrasonic_reflection == 1.0
     stiffness = []
     apart = replace(ball, gap=np.full_like(ball.gap, 1e-6))
     for step in (16, 8, 4):
@@ -241,7 +307,7 @@ def test_capacitance_rises_where_the_load_share_does_not():
 def test_insulated_spots_add_their_capacitance(rough):
     touching = np.zeros_like(rough.in_contact)
     touching[180:184, 120:124] = True
-    changed = replace(rough, in_contact=touching)
+    changed = replace(rough, in_contact=touching, gap=np.where(touching, 5e-9, rough.gap))
     bare, insulated = (
         observables(changed, Sensing(boundary_film=film)).zone_capacitance for film in (None, 5e-9)
     )
@@ -250,4 +316,5 @@ def test_insulated_spots_add_their_capacitance(rough):
     ratio = rough.lubricant.density(rough.pressure[touching]) / rough.lubricant.density.rho0
     mossotti = 1.2 / 4.2 * ratio
     oil = ((1.0 + 2.0 * mossotti) / (1.0 - mossotti)).mean()
+    assert observables(changed, Sensing(boundary_film=5e-9)).contact_resistance is None
     assert insulated - bare == pytest.approx(VACUUM * oil * area / 5e-9, rel=1e-9)

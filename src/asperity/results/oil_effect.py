@@ -8,7 +8,7 @@ from asperity.case import Case
 from asperity.core.quantities import quantity
 from asperity.ehl import ContactError, ContactSolution, ContactState, Sides
 from asperity.lubricant import STATED_ALPHA_ERROR, Barus, Roelands
-from asperity.results.surface_spread import crf_sides
+from asperity.results.surface_spread import Row, crf_sides
 from asperity.solution import contact_state, solve_thermal_contact
 
 Ends = tuple[float, float]
@@ -40,22 +40,23 @@ class AlphaEffect:
         low, high = self.films[key]
         return _sides((low - 1.0, high - 1.0))
 
-    def ends(self, state: ContactState) -> dict[str, Ends]:
+    def ends(self, means: Row) -> dict[str, Ends]:
         """Return the values at both ends by key, SI, for a contact with these means."""
         values: dict[str, Ends] = {}
-        for key, field in FILMS.items():
-            film = getattr(state, field)
-            values[key] = film * self.films[key][0], film * self.films[key][1]
-        low, high = (min(max(state.clr + change, 0.0), 1.0) for change in self.clr)
-        return values | {"clr": (low, high)}
+        for key, (low, high) in self.films.items():
+            film = float(means[key] or 0.0)
+            values[key] = film * low, film * high
+        clr = float(means["clr"] or 0.0)
+        below, above = (min(max(clr + change, 0.0), 1.0) for change in self.clr)
+        return values | {"clr": (below, above)}
 
-    def summary(self, state: ContactState) -> dict[str, object]:
+    def summary(self, means: Row) -> dict[str, object]:
         """Return the effect for `--json`."""
-        return {"alpha_error": self.error, **{k: list(v) for k, v in self.ends(state).items()}}
+        return {"alpha_error": self.error, **{k: list(v) for k, v in self.ends(means).items()}}
 
-    def note(self, state: ContactState) -> str:
+    def note(self, means: Row) -> str:
         """Return a sentence with both ends, and what a measured alpha would gain."""
-        ends = self.ends(state)
+        ends = self.ends(means)
         central, clr = quantity("h_central_m"), quantity("clr")
         share = STATED_ALPHA_ERROR / self.error
         return (
@@ -133,7 +134,7 @@ def alpha_effect(case: Case, solution: ContactSolution) -> AlphaEffect | None:
     return AlphaEffect(oil.alpha_error, films, (low.clr - middle.clr, high.clr - middle.clr))
 
 
-def oil_summary(case: Case, effect: AlphaEffect | None, state: ContactState) -> dict[str, object]:
+def oil_summary(case: Case, effect: AlphaEffect | None, means: Row) -> dict[str, object]:
     """Return what `--json` has for an oil from a data sheet; empty without one.
 
     `oil` has its numbers with their `origins`, `alpha_effect` film and load share at the ends of
@@ -145,4 +146,4 @@ def oil_summary(case: Case, effect: AlphaEffect | None, state: ContactState) -> 
     origins = {fact.key: ": ".join(filter(None, (fact.origin, fact.how))) for fact in facts}
     values: dict[str, object] = {fact.key: fact.value for fact in facts}
     summary: dict[str, object] = {"oil": {**values, "origins": origins}}
-    return summary if effect is None else summary | {"alpha_effect": effect.summary(state)}
+    return summary if effect is None else summary | {"alpha_effect": effect.summary(means)}

@@ -284,13 +284,13 @@ class Run(Derived, Displayed):
 
     def summary(self) -> dict[str, object]:
         """Return the content of `solve --json`: numbers, cells, regime card, oil and notes."""
-        curve = self.dynamic_curve
+        curve, means = self.dynamic_curve, self.scalars()
         return {
-            **self.scalars(),
+            **means,
             "roughness": "standing" if self.running is None else "running",
             "cells": list(self.solution.grid.cells),
             "regime_card": self.card.to_dict(),
-            **oil_summary(self.case, self.alpha_effect, self.state),
+            **oil_summary(self.case, self.alpha_effect, means),
             **({} if curve is None else {"dynamic_curve": curve.scalars()}),
             "notes": [*self.remarks, *self._without_virgin()],
         }

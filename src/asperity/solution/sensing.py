@@ -6,6 +6,8 @@ from typing import Annotated
 from asperity.core.errors import BadInput, require_positive
 from asperity.core.quantities import Parameter, Parametric
 
+MAX_PERMITTIVITY = 5.0  # polar liquids do not follow Clausius and Mossotti
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sensing(Parametric):
@@ -23,8 +25,8 @@ class Sensing(Parametric):
     Raises
     ------
     BadInput
-        for a permittivity below 1, and for other values that are not positive (`film_resistivity`
-        may be 0).
+        for a permittivity below 1 or above 5, and other values that are not positive
+        (`film_resistivity` may be 0).
     """
 
     permittivity: Annotated[float, Parameter("", "ε_r")] = 2.2
@@ -37,10 +39,10 @@ class Sensing(Parametric):
 
     def __post_init__(self) -> None:
         Parametric.__post_init__(self)
-        if not 1.0 <= self.permittivity < 1e3:
+        if not 1.0 <= self.permittivity <= MAX_PERMITTIVITY:
             raise BadInput(
-                f"permittivity must be 1 (vacuum) to 1000, got {self.permittivity:g}; mineral oils "
-                "have 2.1 to 2.4"
+                f"permittivity must be 1 to {MAX_PERMITTIVITY:g}, got {self.permittivity:g}: it "
+                "follows the density as that of non-polar oils; mineral oils have 2.1 to 2.4"
             )
         for resistivity in self.resistivity:
             require_positive("resistivity", resistivity, "ohm m")

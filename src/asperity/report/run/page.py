@@ -124,7 +124,7 @@ def render_page(runs: Sequence[Run], *, title: str | None = None) -> str:
 
 def _alpha_notes(run: Run) -> list[str]:
     """Return the effect of an estimated pressure-viscosity coefficient as a note."""
-    return [] if run.alpha_effect is None else [run.alpha_effect.note(run.state)]
+    return [] if run.alpha_effect is None else [run.alpha_effect.note(run.scalars())]
 
 
 def _has_cold_inlet(runs: Sequence[Run]) -> bool:
