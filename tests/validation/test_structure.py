@@ -12,6 +12,8 @@ from asperity.structure import (
     Structure,
     coupled_modes,
     coupled_receptance,
+    load_structure,
+    sensor_response,
     settled_modes,
     share_of_receptance,
     transfer_of_roughness,
@@ -223,6 +225,19 @@ def test_receptance_coupling_equals_the_assembled_structure():
     )
 
 
+def test_the_sensor_follows_roughness_through_a_single_mass():
+    """x/w = z/(z - ω² m), and the coupling of receptances of a larger structure."""
+    m, k, c, frequency_hz = 0.1, 1e8, 30.0, 3000.0
+    angular = 2.0 * math.pi * frequency_hz
+    spring = k + 1j * angular * c
+    found = sensor_response(Structure.single_mass(m), k, c, frequency_hz)
+    assert found == pytest.approx(spring / (spring - angular**2 * m), rel=1e-12)
+    model = replace(chain(4, 0.5, 1e7, 2), damping=3.0 * np.eye(4))
+    _, transfer, approach = receptances(model, [frequency_hz])
+    expected = transfer_of_roughness(transfer, approach, spring)[0]
+    assert sensor_response(model, k, c, frequency_hz) == pytest.approx(expected, rel=1e-9)
+
+
 def test_shares_from_receptances_are_those_of_the_modes():
     model = chain(5, 0.5, 1e7, 3)
     frequencies_hz = np.linspace(150.0, 1600.0, 29001)
@@ -273,6 +288,56 @@ def test_an_unusable_structure_is_refused_in_one_sentence(changed, message):
     }
     with pytest.raises(BadInput, match=message):
         Structure(**{**usable, **changed})
+
+
+MATRICES = """
+mass = [[2.0, 0.0], [0.0, 20.0]]
+stiffness = [[1e6, 0.0], [0.0, 2e8]]
+contact = [1.0, -1.0]
+sensor = [1.0, 0.0]
+"""
+MODES = """
+name = "gear case"
+noise = 1e-3
+[modes]
+frequency_hz = [100.0, 900.0]
+damping_ratio = [0.01, 0.02]
+contact = [0.3, 0.5]
+sensor = [0.1, 0.2]
+"""
+
+
+def test_a_file_has_matrices_or_modes(tmp_path):
+    (tmp_path / "holder.toml").write_text(MATRICES, "utf-8")
+    holder = load_structure(tmp_path / "holder.toml")
+    assert (holder.name, holder.noise) == ("holder", None)
+    np.testing.assert_array_equal(holder.structure.stiffness, np.diag([1e6, 2e8]))
+    np.testing.assert_array_equal(holder.structure.damping, np.zeros((2, 2)))
+    (tmp_path / "gear.toml").write_text(MODES, "utf-8")
+    gear = load_structure(tmp_path / "gear.toml")
+    assert (gear.name, gear.noise) == ("gear case", 1e-3)
+    frequencies = [mode.frequency_hz for mode in coupled_modes(gear.structure, 0.0)]
+    assert frequencies == pytest.approx([100.0, 900.0], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("mass = [", "is not valid TOML"),
+        (MATRICES.replace("sensor = [1.0, 0.0]", ""), "sensor is missing; add it"),
+        (MATRICES + "masses = 1", "unknown key 'masses'"),
+        (MATRICES.replace("[1.0, -1.0]", '["one", 2.0]'), "not numbers"),
+        (MATRICES.replace("[1.0, -1.0]", "[1.0]"), "contact must be 2 finite numbers"),
+        (MATRICES + "noise = -1.0", "noise must be a positive number"),
+        ("[modes]\nfrequency_hz = [1.0]", r"\[modes\] must have contact, damping_ratio"),
+    ],
+)
+def test_an_unusable_file_is_refused_in_one_sentence(tmp_path, text, message):
+    path = tmp_path / "structure.toml"
+    path.write_text(text, "utf-8")
+    with pytest.raises(BadInput, match=message) as refused:
+        load_structure(path)
+    assert str(refused.value).startswith(str(path))
 
 
 def test_further_inputs_are_checked():

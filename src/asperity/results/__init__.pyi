@@ -24,6 +24,9 @@ from .run import UNCERTAINTY as UNCERTAINTY
 from .run import Run as Run
 from .running import Running as Running
 from .running import running_surfaces as running_surfaces
+from .sensor_view import ObservedMode as ObservedMode
+from .sensor_view import SensorView as SensorView
+from .sensor_view import observe_contact as observe_contact
 from .solve import SurfaceProgress as SurfaceProgress
 from .solve import load_run as load_run
 from .solve import solve_case as solve_case

@@ -24,7 +24,7 @@ class CoupledMode:
     contact_share : share of the contact in the strain energy of the mode, 0 to 1
     contact_shape, sensor_shape : mass-normalised approach in the contact and displacement at the
         sensor [kg^-1/2]
-    stiffness : of the contact in this mode [N/m]
+    stiffness, damping : of the contact in this mode [N/m, N s/m]
     """
 
     frequency_hz: float
@@ -33,6 +33,7 @@ class CoupledMode:
     contact_shape: float
     sensor_shape: float
     stiffness: float
+    damping: float
 
     def shift(self, stiffness_change: float) -> float:
         """Return the relative change of the frequency for a small one of the contact stiffness.
@@ -82,6 +83,7 @@ def coupled_modes(
                 contact_shape=in_contact,
                 sensor_shape=float(sensor @ shape),
                 stiffness=stiffness,
+                damping=damping,
             )
         )
     return tuple(modes)
@@ -123,3 +125,23 @@ def settled_modes(
             )
         found.append(mode)
     return tuple(mode for mode in found if lowest_hz <= mode.frequency_hz <= highest_hz)
+
+
+def sensor_response(
+    structure: Structure, stiffness: float, damping: float, frequency_hz: float
+) -> complex:
+    """Return the displacement of the sensor per displacement that roughness imposes.
+
+    Parameters
+    ----------
+    stiffness, damping : of the contact at this frequency [N/m, N s/m]
+    """
+    angular = 2.0 * math.pi * frequency_hz
+    spring = stiffness + 1j * angular * damping
+    dynamic = (
+        structure.stiffness
+        + 1j * angular * structure.damping
+        - angular**2 * structure.mass
+        + spring * np.outer(structure.contact, structure.contact)
+    )
+    return complex(structure.sensor @ np.linalg.solve(dynamic, spring * structure.contact))
