@@ -186,6 +186,10 @@ BAD = [
     ("contcat.load", "400 N", "contcat is not a known key; did you mean contact?"),
     ("vibration.rate_hz", "50 kHz", "vibration.rate_hz is not a known key; did you mean rate?"),
     ("surface.hurst", "0.8", "surface.hurst is not a known key"),
+    ("grid.x", [1, 2, 3], "grid.x must have 2 values at most, got [1, 2, 3]"),
+    ("sensing.permittivity", 80.0, "permittivity must be 1 to 5, got 80"),
+    ("sensing.resistivity", "-1 ohm m", "sensing.resistivity[0] must be positive and finite"),
+    ("sensing.ultrasonic_frequency", "5 m", "must be a frequency such as"),
     (
         "lubricant.viscosity.law",
         "baruss",

@@ -154,6 +154,9 @@ def _first_error(model: type[Section], error: ValidationError) -> LocatedError:
         return LocatedError(keys, f"is not a known key; {remedy}")
     if kind == "missing":
         return LocatedError(keys, "is missing; add it")
+    if kind == "too_long":
+        most = entry["ctx"]["max_length"]
+        return LocatedError(keys, f"must have {most} values at most, got {quoted(value)}")
     expected = entry["msg"].removeprefix("Input ").removeprefix("should ")
     if expected.startswith("be a valid dictionary"):
         expected = "be a table"
