@@ -155,13 +155,18 @@ def _first_error(model: type[Section], error: ValidationError) -> LocatedError:
     if kind == "missing":
         return LocatedError(keys, "is missing; add it")
     if kind == "too_long":
-        most = entry["ctx"]["max_length"]
-        return LocatedError(keys, f"must have {most} values at most, got {quoted(value)}")
-    expected = entry["msg"].removeprefix("Input ").removeprefix("should ")
-    if expected.startswith("be a valid dictionary"):
-        expected = "be a table"
-    expected = expected.replace("'", '"').replace("a valid tuple", "a list")
+        expected = f"have {entry['ctx']['max_length']} values at most"
+    else:
+        expected = _expected(entry["msg"])
     return LocatedError(keys, f"must {expected}, got {quoted(value)}{remedy_for(value)}")
+
+
+def _expected(message: str) -> str:
+    """Return what a value must be, from pydantic's message, in the words of a case file."""
+    expected = message.removeprefix("Input ").removeprefix("should ")
+    if expected.startswith("be a valid dictionary"):
+        return "be a table"
+    return expected.replace("'", '"').replace("a valid tuple", "a list")
 
 
 def _keys_of(model: type[Section], keys: tuple[str | int, ...]) -> list[str]:
