@@ -77,6 +77,14 @@ def test_what_cannot_be_observed_is_refused_in_one_sentence(asp):
     assert (code, "missing.toml does not exist" in err) == (2, True)
 
 
+def test_without_roughness_the_answer_is_not_determined(asp):
+    arguments = ("observe", "case.toml", "--set", 'surface="flat"', "--json")
+    result = json.loads(asp(*arguments)[1])
+    assert result["visible"] is None
+    assert result["verdict"].startswith("Not determined whether this sensor can see this contact")
+    assert "100 % of the strain energy" in result["verdict"]
+
+
 def test_modes_outside_the_band_are_stated(asp):
     Path("slow.toml").write_text(
         "mass = [[1e9]]\nstiffness = [[0.0]]\ncontact = [1.0]\nsensor = [1.0]\n", "utf-8"

@@ -99,6 +99,13 @@ class SensorView:
                 f"This sensor cannot see this contact: {self.named.name} has no mode from "
                 f"{BAND_HZ[0]:g} to {BAND_HZ[1]:g} Hz."
             )
+        if len(self.sq) < 2:
+            largest = max(self.modes, key=lambda observed: observed.mode.contact_share).mode
+            return (
+                "Not determined whether this sensor can see this contact: the case has no Sq that "
+                f"could wear; the contact has {100.0 * largest.contact_share:.3g} % of the strain "
+                f"energy of the mode of {self.named.name} at {largest.frequency_hz:.0f} Hz."
+            )
         best = max(self.visible or self.modes, key=lambda observed: observed.movement)
         can = "can" if self.visible else "cannot"
         reason = "" if best.movement <= self.resolution or self.visible else ", below the noise"
@@ -116,7 +123,7 @@ class SensorView:
             "verdict": self.verdict(),
             "structure": self.named.name,
             "resolution": self.resolution,
-            "visible": bool(self.visible),
+            "visible": bool(self.visible) if len(self.sq) > 1 else None,
             "sq_m": list(self.sq),
             "clr": list(self.clr),
             "modes": [observed.row() for observed in self.modes],
@@ -154,8 +161,8 @@ def observe_contact(
     named = named or _single_mass(case)
     still = case.with_written({"contact.roughness": "standing", "solver.surfaces": 1})
     sq = still.surface().sq
-    stated = getattr(still.contents.surface, "sq", None) is not None and still.stored is None
-    factors = ROUGHNESS_FACTORS if stated and sq > 0.0 else (1.0,)
+    scalable = hasattr(still.contents.surface, "sq") and still.stored is None
+    factors = ROUGHNESS_FACTORS if scalable and sq > 0.0 else (1.0,)
     runs = [
         solve_case(
             still if factor == 1.0 else still.with_overrides({"surface.sq": factor * sq}),
