@@ -62,6 +62,10 @@ def test_the_verdict_states_the_largest_deviations(profiles):
     simulated = max(profile.from_simulated for profile in profiles)
     assert f"within {100.0 * simulated:.1f} % of a published simulation" in verdict
     assert verdict.endswith("of 10 measured profiles.")
+    result = ExperimentResult((), tuple(profiles)).scalars()
+    (described,) = result["profile_sets"]
+    assert "far deeper than the simulated ones" in described["missed"]
+    assert {row["experiment"] for row in result["profiles"]} == {described["experiment"]}
 
 
 def test_a_dimple_needs_oil():

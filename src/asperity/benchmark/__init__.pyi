@@ -8,10 +8,12 @@ from .experiments import Comparison as Comparison
 from .experiments import ExperimentResult as ExperimentResult
 from .experiments import compare_experiments as compare_experiments
 from .experiments import compare_with as compare_with
+from .measurements import ComputedSet as ComputedSet
 from .measurements import DimpleExperiment as DimpleExperiment
 from .measurements import DimpleRun as DimpleRun
 from .measurements import Experiment as Experiment
 from .measurements import MeasuredPoint as MeasuredPoint
+from .measurements import MeasuredSet as MeasuredSet
 from .measurements import NotComputed as NotComputed
 from .measurements import load_experiments as load_experiments
 from .run import BenchmarkResult as BenchmarkResult

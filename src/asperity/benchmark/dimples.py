@@ -27,7 +27,7 @@ class DimpleProfile:
     `half_width` of the Hertz zone [m]; `films` [m] at `x` [m], one per time step.
     """
 
-    experiment: str
+    experiment: DimpleExperiment
     run: str
     number: int
     measured: Profile
@@ -71,7 +71,7 @@ class DimpleProfile:
     def row(self) -> dict[str, object]:
         """Return the comparison for `--json`."""
         return {
-            "experiment": self.experiment,
+            "experiment": self.experiment.name,
             "run": self.run,
             "profile": self.number,
             "from_measured": self.from_measured,
@@ -108,7 +108,7 @@ def compute_dimples(experiment: DimpleExperiment) -> list[DimpleProfile]:
         ):
             profiles.append(
                 DimpleProfile(
-                    experiment=experiment.name,
+                    experiment=experiment,
                     run=run.name,
                     number=number,
                     measured=measured,

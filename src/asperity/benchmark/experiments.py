@@ -118,7 +118,7 @@ class ExperimentResult:
             *([self._of_values()] if self.comparisons else []),
             *([self._of_profiles()] if self.profiles else []),
             *(
-                f"Not computed: {entry.title} ({len(entry.points)} values; {entry.not_computed})."
+                f"Not computed: {entry.title} ({len(entry.points)} values; {entry.reason})."
                 for entry in self.not_computed
             ),
         ]
@@ -163,13 +163,8 @@ class ExperimentResult:
     def scalars(self) -> dict[str, object]:
         """Return the result for `--json`."""
         sets = [
-            {
-                "experiment": comparison.experiment.name,
-                "title": comparison.experiment.title,
-                "source": comparison.experiment.source,
-                "rig": comparison.experiment.rig,
-                "given": comparison.experiment.given,
-                "assumed": comparison.experiment.assumed,
+            comparison.experiment.description()
+            | {
                 "fitted_viscosity": comparison.fitted_viscosity,
                 "points": len(comparison.points),
                 "mean_ratio": comparison.mean,
@@ -177,25 +172,20 @@ class ExperimentResult:
                 "isothermal_mean_ratio": comparison.isothermal_mean,
                 "isothermal_scatter": comparison.isothermal_scatter,
                 "mean_interval": comparison.mean_interval,
-                "missed": comparison.experiment.missed,
             }
             for comparison in self.comparisons
         ]
         not_computed = [
-            {
-                "experiment": entry.name,
-                "title": entry.title,
-                "source": entry.source,
-                "rig": entry.rig,
-                "reason": entry.not_computed,
-                "measured": [point.value for point in entry.points],
-            }
+            entry.description()
+            | {"reason": entry.reason, "measured": [point.value for point in entry.points]}
             for entry in self.not_computed
         ]
+        dimples = {profile.experiment.name: profile.experiment for profile in self.profiles}
         return {
             "verdict": self.verdict(),
             "sets": sets,
             "rows": self.rows(),
+            "profile_sets": [entry.description() for entry in dimples.values()],
             "profiles": [profile.row() for profile in self.profiles],
             "not_computed": not_computed,
         }

@@ -39,46 +39,70 @@ class MeasuredPoint:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Experiment:
-    """A set of measurements.
+class MeasuredSet:
+    """A set of measurements: its name, title, source and rig, in words."""
+
+    name: str
+    title: str
+    source: str
+    rig: str
+
+    def description(self) -> dict[str, object]:
+        """Return what `--json` states of the set."""
+        return {
+            "experiment": self.name,
+            "title": self.title,
+            "source": self.source,
+            "rig": self.rig,
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class ComputedSet(MeasuredSet):
+    """A set that asperity computes from a case.
+
+    `given` and `assumed` are inputs of the computation, `missed` states where computation and
+    measurement differ, all in words.
+    """
+
+    given: str
+    assumed: str
+    missed: str
+    case: Case
+
+    def description(self) -> dict[str, object]:
+        """Return what `--json` states of the set."""
+        inputs = {"given": self.given, "assumed": self.assumed, "missed": self.missed}
+        return MeasuredSet.description(self) | inputs
+
+
+@dataclass(frozen=True, kw_only=True)
+class Experiment(ComputedSet):
+    """A set of measured values.
 
     Parameters
     ----------
-    given, assumed : inputs of the computation, in words
     fits_viscosity : the oil's viscosity is fitted, so that the mean ratio is 1
-    missed : where computation and measurement differ, in words; may be empty
     key : key of the measured quantity in the catalogue
     swept : name and unit of the value that varies from point to point
     mean, scatter, isothermal_scatter : of computed over measured, the last without inlet shear
         heating, as documented; the tests hold the solver to them
     """
 
-    name: str
-    title: str
-    source: str
-    rig: str
-    given: str
-    assumed: str
     fits_viscosity: bool
-    missed: str
     key: str
     swept: str
     mean: float
     scatter: float
     isothermal_scatter: float
-    case: Case
     points: tuple[MeasuredPoint, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
-class NotComputed:
-    """A set of measurements that asperity cannot compute, and the reason (`not_computed`)."""
+class NotComputed(MeasuredSet):
+    """A set that asperity cannot compute, and the reason."""
 
-    name: str
-    title: str
-    source: str
-    rig: str
-    not_computed: str
+    reason: str
     key: str
     swept: str
     points: tuple[MeasuredPoint, ...]
@@ -108,17 +132,9 @@ class DimpleRun:
 
 
 @dataclass(frozen=True, kw_only=True)
-class DimpleExperiment:
-    """Runs of a dimple through a contact; attributes as those of `Experiment`."""
+class DimpleExperiment(ComputedSet):
+    """Runs of a dimple through a contact."""
 
-    name: str
-    title: str
-    source: str
-    rig: str
-    given: str
-    assumed: str
-    missed: str
-    case: Case
     runs: tuple[DimpleRun, ...]
 
 
@@ -163,7 +179,7 @@ def _read(path: Path) -> AnyExperiment:
             "points": tuple(_point(columns, row) for row in rows),
         }
         if "not_computed" in content:
-            return NotComputed(**content)
+            return NotComputed(reason=content.pop("not_computed"), **content)
         return Experiment(case=load_case(content.pop("case")), **content)
     except (
         tomllib.TOMLDecodeError,
