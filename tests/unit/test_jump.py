@@ -86,7 +86,7 @@ def test_observables_are_means_over_the_positions():
     touching = replace(OBSERVABLES, capacitance=3e-10, contact_resistance=2e-3)
     other = replace(solved, observables=touching)
     row = contact_row(model.case, [solved, other], 1e-6)
-    assert row["capacitance_f"] == pytest.approx(2e-10)
+    assert row["capacitance_f"] == pytest.approx(2e-10, abs=0.0)
     assert row["contact_resistance_ohm"] == pytest.approx(2e-3)
     assert math.isnan(contact_row(model.case, [solved], 1e-6)["contact_resistance_ohm"])
     assert 0.0 < row["ultrasonic_reflection"] < 1.0

@@ -55,6 +55,10 @@ def test_the_deviation_of_a_film_that_is_a_tenth_thicker_is_a_tenth(profiles):
     flat = np.full_like(film, film.mean())
     thicker = replace(profiles[0], measured=(x, flat), simulated=(x, 1.1 * flat))
     assert thicker.simulated_from_measured == pytest.approx(0.1, rel=1e-12)
+    known = next(profile for profile in profiles if profile.upstream_ratio is not None)
+    best = (known.beside_measured,)
+    half = replace(known, films=best, measured=(known.measured[0], 2.0 * known.measured[1]))
+    assert half.upstream_ratio == pytest.approx(0.5 * known.upstream_ratio, rel=1e-12)
 
 
 def test_the_verdict_states_the_largest_deviations(profiles):
