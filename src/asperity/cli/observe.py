@@ -21,8 +21,9 @@ def observe(
         Path | None,
         typer.Option(
             "--structure",
-            metavar="FILE.toml",
-            help="Matrices or modes of the structure (default: the mass of [vibration] alone).",
+            metavar="FILE",
+            help="Structure without its contact: matrices, modes or measured receptances "
+            "(default: the mass of [vibration] alone).",
         ),
     ] = None,
     resolution: Annotated[

@@ -149,8 +149,12 @@ def netcdf_bytes(dataset: "xarray.Dataset", encoding: Mapping[str, Mapping[str, 
     return buffer.getvalue()
 
 
-def read_netcdf(path: Path, names: Collection[str], remedy: str) -> "xarray.Dataset":
-    """Read variables of a netCDF file with a digest into memory, by a subprocess with limits.
+def read_netcdf(
+    path: Path, names: Collection[str], remedy: str, *, sealed: bool = True
+) -> "xarray.Dataset":
+    """Read variables of a netCDF file into memory, by a subprocess with limits.
+
+    A file that this package wrote is `sealed`: it must have its digest.
 
     Raises
     ------
@@ -162,7 +166,12 @@ def read_netcdf(path: Path, names: Collection[str], remedy: str) -> "xarray.Data
 
     require_file(path)
     variables, attributes = read_in_subprocess(
-        path.absolute(), "asperity.core.unpacking:unpack_netcdf", [*names], remedy, remedy=remedy
+        path.absolute(),
+        "asperity.core.unpacking:unpack_netcdf",
+        [*names],
+        remedy,
+        sealed,
+        remedy=remedy,
     )
     return xarray.Dataset(
         {name: variable for name, variable in variables.items() if variable[0] != (name,)},

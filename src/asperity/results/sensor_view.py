@@ -15,7 +15,9 @@ from asperity.solution import OscillatingContact
 from asperity.structure import (
     CoupledMode,
     NamedStructure,
+    Receptances,
     Structure,
+    receptance_modes,
     sensor_response,
     settled_modes,
 )
@@ -84,7 +86,7 @@ class SensorView:
             and (
                 noise is None
                 or observed.amplitude_at_sensor is None
-                or observed.amplitude_at_sensor > noise
+                or observed.amplitude_at_sensor > noise.interpolate(observed.mode.frequency_hz)
             )
         )
 
@@ -183,7 +185,9 @@ def observe_contact(
     )
 
 
-def _observed(structure: Structure, runs: Sequence[Run], own: int) -> tuple[ObservedMode, ...]:
+def _observed(
+    structure: Structure | Receptances, runs: Sequence[Run], own: int
+) -> tuple[ObservedMode, ...]:
     """Return the modes in the band over the course of `runs`, of which `own` is the case's own."""
     courses = [_modes(structure, run) for run in runs]
     shares = [run.state.clr for run in runs]
@@ -191,7 +195,17 @@ def _observed(structure: Structure, runs: Sequence[Run], own: int) -> tuple[Obse
     for number, mode in enumerate(courses[own]):
         if not BAND_HZ[0] <= mode.frequency_hz <= BAND_HZ[1]:
             continue
-        over_course = tuple(course[number].frequency_hz for course in courses)
+        over_course = tuple(
+            course[number].frequency_hz
+            if len(course) == len(courses[own])
+            # of receptances, a mode may leave the measured frequencies
+            else min(
+                (other.frequency_hz for other in course),
+                key=lambda frequency_hz: abs(frequency_hz - mode.frequency_hz),
+                default=mode.frequency_hz,
+            )
+            for course in courses
+        )
         observed.append(
             ObservedMode(
                 mode=mode,
@@ -213,7 +227,7 @@ def _single_mass(case: Case) -> NamedStructure:
     )
 
 
-def _modes(structure: Structure, run: Run) -> tuple[CoupledMode, ...]:
+def _modes(structure: Structure | Receptances, run: Run) -> tuple[CoupledMode, ...]:
     """Return all modes with the contact's stiffness and damping at their frequencies."""
     contact = OscillatingContact(run.solution)
     grid = np.geomspace(*BAND_HZ, FREQUENCIES)
@@ -227,6 +241,8 @@ def _modes(structure: Structure, run: Run) -> tuple[CoupledMode, ...]:
             float(np.interp(place, np.log(grid), damping)),
         )
 
+    if isinstance(structure, Receptances):
+        return receptance_modes(structure, spring)
     return settled_modes(structure, spring)
 
 
@@ -238,7 +254,7 @@ def _slope(shares: Sequence[float], frequencies_hz: Sequence[float]) -> float | 
     return math.log(frequencies_hz[-1] / frequencies_hz[0]) / change
 
 
-def _amplitude(structure: Structure, run: Run, mode: CoupledMode) -> float | None:
+def _amplitude(structure: Structure | Receptances, run: Run, mode: CoupledMode) -> float | None:
     """Return the acceleration density at the sensor [m/s²/√Hz] where a mode resonates."""
     vibration = run.vibration
     if vibration is None or vibration.excitation is None or vibration.profile is None:
@@ -247,5 +263,9 @@ def _amplitude(structure: Structure, run: Run, mode: CoupledMode) -> float | Non
     if 2.0 * frequency_hz > vibration.profile.rate_hz:
         return None
     density = vibration.excitation.density(np.array([frequency_hz]), vibration.profile.rate_hz)
-    response = sensor_response(structure, mode.stiffness, mode.damping, frequency_hz)
+    response = (
+        structure.response(mode.stiffness, mode.damping, frequency_hz)
+        if isinstance(structure, Receptances)
+        else sensor_response(structure, mode.stiffness, mode.damping, frequency_hz)
+    )
     return (2.0 * math.pi * frequency_hz) ** 2 * abs(response) * math.sqrt(float(density[0]))

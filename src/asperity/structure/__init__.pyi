@@ -1,10 +1,12 @@
 from .files import NamedStructure as NamedStructure
+from .files import SensorNoise as SensorNoise
 from .files import load_structure as load_structure
 from .matrices import Structure as Structure
 from .modes import CoupledMode as CoupledMode
 from .modes import coupled_modes as coupled_modes
 from .modes import sensor_response as sensor_response
 from .modes import settled_modes as settled_modes
+from .receptance import Receptances as Receptances
 from .receptance import coupled_receptance as coupled_receptance
-from .receptance import share_of_receptance as share_of_receptance
+from .receptance import receptance_modes as receptance_modes
 from .receptance import transfer_of_roughness as transfer_of_roughness

@@ -1,42 +1,79 @@
-"""Structure of a TOML file: matrices, or modes."""
+"""Structure of a file: matrices, modes or measured receptances, in TOML, csv or netCDF."""
 
+import csv
 import tomllib
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 
-from asperity.core.errors import BadInput, UnreadableFile
+from asperity.core.arrays import Field
+from asperity.core.errors import BadInput, UnreadableFile, install_text
 from asperity.core.files import require_file
+from asperity.core.sandbox import read_in_subprocess
+from asperity.core.storage import read_netcdf
 from asperity.structure.matrices import Structure
+from asperity.structure.rational import Complex
+from asperity.structure.receptance import Receptances
+from asperity.structure.universal_file import FREQUENCY_RESPONSE, POWER_SPECTRUM, REMEDY, Function
 
 MAX_BYTES = 20_000_000  # of a file: matrices of a thousand degrees of freedom
-KEYS = {"name", "mass", "stiffness", "damping", "contact", "sensor", "noise", "modes"}
-MODE_KEYS = {"frequency_hz", "damping_ratio", "contact", "sensor"}
+MATRIX_KEYS = ("mass", "stiffness", "damping", "contact", "sensor")
+MODE_KEYS = ("frequency_hz", "damping_ratio", "contact", "sensor")
+RECEPTANCE_KEYS = (
+    *("frequency_hz", "approach_real", "approach_imag", "transfer_real", "transfer_imag"),
+)
+NODE_KEYS = ("file", "body_1", "body_2", "sensor")
+Content: TypeAlias = Mapping[str, object]
+
+
+@dataclass(frozen=True, eq=False)
+class SensorNoise:
+    """Amplitude density of a sensor's noise [m/s²/√Hz] over frequency, constant beyond its ends."""
+
+    frequencies_hz: Field
+    density: Field
+
+    def interpolate(self, frequency_hz: float) -> float:
+        """Return the density at a frequency."""
+        return float(np.interp(frequency_hz, self.frequencies_hz, self.density))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class NamedStructure:
-    """Structure with its name, and the noise density of its sensor [m/s²/√Hz], if known."""
+    """Structure without its contact, with its name, and the noise of its sensor, if known."""
 
     name: str
-    structure: Structure
-    noise: float | None = None
+    structure: Structure | Receptances
+    noise: SensorNoise | None = None
 
 
 def load_structure(path: str | Path) -> NamedStructure:
-    """Load a structure in SI units from a TOML file.
+    """Load a structure in SI units.
 
-    The file has the matrices `mass`, `stiffness` and perhaps `damping`, with `contact` and
-    `sensor`; or `[modes]` with `frequency_hz`, `damping_ratio`, `contact` and `sensor`. `name` and
-    `noise` are optional.
+    A file has one of
+
+    - the matrices `mass`, `stiffness` and perhaps `damping`, with `contact` and `sensor`,
+    - modes: `frequency_hz`, `damping_ratio`, `contact` and `sensor`,
+    - receptances: `frequency_hz`, `approach_real`, `approach_imag`, `transfer_real` and
+      `transfer_imag`,
+
+    as variables of netCDF, as columns of csv (not matrices), or as keys of TOML, where modes stand
+    in `[modes]`. `[receptances]` in TOML names a universal `file` (data set 58, function type 4)
+    and in it `body_1`, perhaps `body_2`, and `sensor`, each as node and axis such as "11Z", both
+    bodies along one axis. Missing responses from body 1 or the sensor to body 2 count as 0, as of
+    separate bodies. The power spectrum of the sensor (type 9) is the noise. TOML and the
+    attributes of netCDF may state `name` and `noise` [m/s²/√Hz].
 
     Raises
     ------
     UnreadableFile
-        for a missing file, a large one, or one that is not TOML.
+        for a missing file, a large one, or one that is damaged or in another format.
     BadInput
-        for missing or unknown keys, and as `Structure`.
+        for missing or unknown keys, a universal file without the extra `recordings`, and as
+        `Structure` and `Receptances`.
     """
     path = Path(path)
     require_file(path)
@@ -45,19 +82,17 @@ def load_structure(path: str | Path) -> NamedStructure:
             f"{path} has {path.stat().st_size} bytes, too many for a structure; reduce it to fewer "
             "modes"
         )
-    try:
-        content = tomllib.loads(path.read_text("utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise UnreadableFile(f"{path} is not valid TOML: {error}") from None
-    unknown = sorted(set(content) - KEYS)
-    if unknown:
-        raise BadInput(f"{path}: unknown key {unknown[0]!r}; use {', '.join(sorted(KEYS))}")
-    try:
-        return NamedStructure(
-            name=str(content.get("name", path.stem)),
-            structure=_structure(content),
-            noise=None if "noise" not in content else _positive(content["noise"]),
+    readers = {".csv": _read_csv, ".nc": _read_netcdf, ".toml": _read_toml}
+    if path.suffix.lower() not in readers:
+        raise BadInput(
+            f"a structure is read from .toml, .csv or .nc, got {path.name}; "
+            "name a universal file in [receptances] of a .toml file"
         )
+    content = readers[path.suffix.lower()](path)
+    try:
+        return _named(path, content)
+    except UnreadableFile:
+        raise
     except KeyError as missing:
         raise BadInput(f"{path}: {missing.args[0]} is missing; add it") from None
     except (TypeError, ValueError) as error:
@@ -65,29 +100,158 @@ def load_structure(path: str | Path) -> NamedStructure:
         raise BadInput(f"{path}: {reason}") from None
 
 
-def _structure(content: dict[str, object]) -> Structure:
-    modes = content.get("modes")
-    if modes is None:
-        mass = np.asarray(content["mass"], dtype=float)
-        damping = content.get("damping")
-        return Structure(
-            mass=mass,
-            stiffness=np.asarray(content["stiffness"], dtype=float),
-            damping=np.zeros(mass.shape) if damping is None else np.asarray(damping, dtype=float),
-            contact=np.asarray(content["contact"], dtype=float),
-            sensor=np.asarray(content["sensor"], dtype=float),
+def _named(path: Path, content: Content) -> NamedStructure:
+    noise = _noise(content.get("noise"))
+    nodes = content.get("receptances")
+    if isinstance(nodes, Mapping):
+        _require_keys("[receptances]", nodes, NODE_KEYS)
+        structure, measured = _measured(path, nodes)
+        return NamedStructure(
+            name=str(content.get("name", path.stem)), structure=structure, noise=noise or measured
         )
-    if not isinstance(modes, dict) or set(modes) != MODE_KEYS:
-        raise BadInput(f"[modes] must have {', '.join(sorted(MODE_KEYS))}")
-    return Structure.from_modes(
-        modes["frequency_hz"],
-        modes["damping_ratio"],
-        contact=modes["contact"],
-        sensor=modes["sensor"],
+    modes = content.get("modes")
+    if isinstance(modes, Mapping):
+        _require_keys("[modes]", modes, MODE_KEYS)
+        content = {**content, **modes}
+    return NamedStructure(
+        name=str(content.get("name", path.stem)), structure=_structure(content), noise=noise
     )
 
 
-def _positive(value: object) -> float:
+def _structure(content: Content) -> Structure | Receptances:
+    if "approach_real" in content:
+        frequencies_hz, *parts = (_numbers(content, key) for key in RECEPTANCE_KEYS)
+        return Receptances(
+            frequencies_hz=frequencies_hz,
+            approach=parts[0] + 1j * parts[1],
+            transfer=parts[2] + 1j * parts[3],
+        )
+    if "frequency_hz" in content:
+        frequencies_hz, ratios, contact, sensor = (_numbers(content, key) for key in MODE_KEYS)
+        return Structure.from_modes(frequencies_hz, ratios, contact=contact, sensor=sensor)
+    mass = _numbers(content, "mass")
+    return Structure(
+        mass=mass,
+        stiffness=_numbers(content, "stiffness"),
+        damping=_numbers(content, "damping") if "damping" in content else np.zeros(mass.shape),
+        contact=_numbers(content, "contact"),
+        sensor=_numbers(content, "sensor"),
+    )
+
+
+def _numbers(content: Content, key: str) -> Field:
+    return np.asarray(content[key], dtype=float)
+
+
+def _require_keys(table: str, content: Content, keys: tuple[str, ...]) -> None:
+    if unknown := sorted(set(content) - set(keys)):
+        raise BadInput(f"unknown key {unknown[0]!r} in {table}; use {', '.join(keys)}")
+
+
+def _noise(value: object) -> SensorNoise | None:
+    if value is None:
+        return None
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < np.inf:
         raise BadInput(f"noise must be a positive number in m/s²/√Hz, got {value!r}")
-    return float(value)
+    return SensorNoise(np.zeros(1), np.full(1, float(value)))
+
+
+# Formats
+# ----------------------------------------------------------------
+
+
+def _read_toml(path: Path) -> Content:
+    try:
+        content = tomllib.loads(path.read_text("utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise UnreadableFile(f"{path} is not valid TOML: {error}") from None
+    try:
+        _require_keys("the file", content, ("name", "noise", *MATRIX_KEYS, "modes", "receptances"))
+    except BadInput as error:
+        raise BadInput(f"{path}: {error}") from None
+    return content
+
+
+def _read_csv(path: Path) -> Content:
+    with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
+        rows = [row for row in csv.reader(file, skipinitialspace=True) if row]
+    if len(rows) < 2 or any(len(row) != len(rows[0]) for row in rows):
+        raise UnreadableFile(f"{path} is not a table: give it a heading and full rows")
+    return dict(zip(rows[0], zip(*rows[1:], strict=True), strict=True))
+
+
+def _read_netcdf(path: Path) -> Content:
+    names = {*MATRIX_KEYS, *MODE_KEYS, *RECEPTANCE_KEYS}
+    dataset = read_netcdf(path, sorted(names), "write the structure again", sealed=False)
+    stated = {key: dataset.attrs[key] for key in ("name", "noise") if key in dataset.attrs}
+    if "noise" in stated:
+        stated["noise"] = float(np.ravel(stated["noise"])[0])
+    return {**{str(name): dataset[name].to_numpy() for name in dataset.variables}, **stated}
+
+
+def _measured(path: Path, nodes: Content) -> tuple[Receptances, SensorNoise | None]:
+    """Return the receptances of the bodies and the sensor in a universal file, and the noise."""
+    file = path.parent / str(nodes["file"])
+    functions = _functions(file)
+    first, second, sensor = (str(nodes.get(key, "")) for key in ("body_1", "body_2", "sensor"))
+    found = {
+        frozenset((response, reference)): (frequencies_hz, values)
+        for kind, response, reference, frequencies_hz, values in functions
+        if kind == FREQUENCY_RESPONSE
+    }
+    required = [(first, first), (sensor, first), *([(second, second)] if second else [])]
+    _require_responses(file, found, required)
+    frequencies_hz, _ = found[frozenset((first,))]
+
+    def values(response: str, reference: str) -> Complex:
+        absent = frequencies_hz, np.zeros(frequencies_hz.size, dtype=complex)
+        at_hz, measured = found.get(frozenset((response, reference)), absent)
+        if not np.array_equal(at_hz, frequencies_hz):
+            raise BadInput(f"{file.name}: its frequency responses have different frequencies")
+        return measured
+
+    approach = values(first, first) + values(second, second) - 2.0 * values(first, second)
+    receptances = Receptances(
+        frequencies_hz=frequencies_hz,
+        approach=approach,
+        transfer=values(sensor, first) - values(sensor, second),
+    )
+    return receptances, _measured_noise(functions, sensor)
+
+
+def _require_responses(
+    file: Path, found: Collection[frozenset[str]], required: Iterable[tuple[str, str]]
+) -> None:
+    for pair in required:
+        if frozenset(pair) not in found:
+            present = ", ".join(sorted(" and ".join(sorted(entry)) for entry in found))
+            raise BadInput(
+                f"{file.name} has no frequency response between {pair[0]} and {pair[1]}; it has "
+                f"those between {present}"
+            )
+
+
+def _functions(file: Path) -> list[Function]:
+    """Read a universal file in the reading process."""
+    require_file(file)
+    reader = "asperity.structure.universal_file:read_functions"
+    try:
+        functions: list[Function] = read_in_subprocess(
+            file.absolute(), reader, remedy=REMEDY, library="pyuff"
+        )
+    except ImportError:
+        raise BadInput(
+            f"{file.name} needs pyuff; install it with {install_text('recordings')}"
+        ) from None
+    return functions
+
+
+def _measured_noise(functions: Sequence[Function], sensor: str) -> SensorNoise | None:
+    return next(
+        (
+            SensorNoise(frequencies_hz, np.sqrt(np.abs(density)))
+            for kind, response, _, frequencies_hz, density in functions
+            if kind == POWER_SPECTRUM and response == sensor
+        ),
+        None,
+    )

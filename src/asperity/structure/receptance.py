@@ -1,17 +1,124 @@
-"""Coupling of measured receptances by the contact: displacement per force over frequency.
+"""Measured receptances of a structure, displacement per force, and their coupling by the contact.
 
-`approach` is the receptance of the contact, approach of the bodies per pair of forces that press
-them together; `transfer` that from these forces to the sensor. All are complex [m/N] at the same
-frequencies, measured without the contact's spring. `spring` is the contact's k + iωc [N/m].
-Sources: R. E. D. Bishop and D. C. Johnson, The Mechanics of Vibration (1960).
+Motion is the real part of a complex amplitude times exp(iωt), so that a damped receptance has a
+negative imaginary part. `spring` is the contact's k + iωc [N/m].
+Source: R. E. D. Bishop and D. C. Johnson, The Mechanics of Vibration (1960).
 """
 
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
+import numpy.typing as npt
 import scipy
 from numpy.typing import ArrayLike
 
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
+from asperity.structure.modes import CoupledMode
+from asperity.structure.rational import RationalFit, rational_fit
+
+MIN_FREQUENCIES = 4
+MIN_SHARE = 1e-3  # of the contact in the strain energy of a mode
+MAX_DAMPING = 0.3  # of a mode
+SAME_MODE = 1e-4  # relative difference of two roots
+SETTLED, MAX_STEPS = 1e-10, 100
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Receptances:
+    """Receptances of a structure, measured without the spring of its contact.
+
+    The frequencies must lie closer together than the contact moves a mode.
+
+    Parameters
+    ----------
+    frequencies_hz : increasing, shape (n,)
+    approach : approach of the bodies per pair of forces that press them together [m/N], complex,
+        (n,); with receptances of the two bodies H11 + H22 - H12 - H21 along one axis
+    transfer : displacement at the sensor per such pair [m/N], complex, (n,)
+
+    Raises
+    ------
+    BadInput
+        for fewer than four frequencies, frequencies that do not increase, values that are not
+        finite, or an approach in phase with the velocity against the forces.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity.structure import Receptances, receptance_modes
+    >>> frequencies_hz = np.linspace(100.0, 2000.0, 400)
+    >>> angular = 2.0 * np.pi * frequencies_hz
+    >>> mass = -1.0 / (2.0 * angular**2) + 0j  # 2 kg, free
+    >>> measured = Receptances(frequencies_hz=frequencies_hz, approach=mass, transfer=mass)
+    >>> (mode,) = receptance_modes(measured, lambda frequency_hz: (1e7, 50.0))
+    >>> f"{mode.frequency_hz:.1f} Hz, share {mode.contact_share:.3f}, {mode.damping_ratio:.4f}"
+    '355.9 Hz, share 1.000, 0.0056'
+    """
+
+    frequencies_hz: Field
+    approach: npt.NDArray[np.complex128]
+    transfer: npt.NDArray[np.complex128]
+
+    def __post_init__(self) -> None:
+        frequencies_hz = np.asarray(self.frequencies_hz, dtype=float)
+        approach, transfer = (
+            np.asarray(getattr(self, n), complex) for n in ("approach", "transfer")
+        )
+        if (
+            frequencies_hz.ndim != 1
+            or frequencies_hz.size < MIN_FREQUENCIES
+            or not np.all(np.diff(frequencies_hz) > 0.0)
+            or not frequencies_hz[0] > 0.0
+        ):
+            raise BadInput(
+                "receptances need four or more increasing frequencies above 0 Hz; sort and "
+                "complete them"
+            )
+        for name, values in (("approach", approach), ("transfer", transfer)):
+            if values.shape != frequencies_hz.shape or not np.all(np.isfinite(values)):
+                raise BadInput(
+                    f"receptance {name} must be {frequencies_hz.size} finite numbers, one for each "
+                    f"frequency, got shape {values.shape}"
+                )
+        if not np.all(approach):
+            raise BadInput("receptance approach is 0 at a frequency; leave that frequency out")
+        if float(np.sum(approach.imag / np.abs(approach))) > 0.0:
+            raise BadInput(
+                "receptance approach has a positive imaginary part: forces and displacements have "
+                "opposite directions, or the phase the other sign; correct it"
+            )
+        for name, array in (
+            ("frequencies_hz", frequencies_hz),
+            ("approach", approach),
+            ("transfer", transfer),
+        ):
+            object.__setattr__(self, name, array)
+
+    def response(self, stiffness: float, damping: float, frequency_hz: float) -> complex:
+        """Return the displacement of the sensor per displacement that roughness imposes.
+
+        Raises
+        ------
+        BadInput
+            for a frequency outside the measured ones.
+        """
+        if not self.frequencies_hz[0] <= frequency_hz <= self.frequencies_hz[-1]:
+            raise BadInput(
+                f"{frequency_hz:g} Hz is outside the measured {self.frequencies_hz[0]:g} to "
+                f"{self.frequencies_hz[-1]:g} Hz; state a frequency inside"
+            )
+        spring = stiffness + 2j * math.pi * frequency_hz * damping
+        # its poles are the antiresonances alone
+        inverse = scipy.interpolate.CubicSpline(self.frequencies_hz, 1.0 / self.approach)
+        return self.ratio_at(frequency_hz) * spring / (complex(inverse(frequency_hz)) + spring)
+
+    def ratio_at(self, frequency_hz: float) -> complex:
+        """Return the displacement of the sensor per approach in the contact."""
+        ratio = scipy.interpolate.CubicSpline(self.frequencies_hz, self.transfer / self.approach)
+        return complex(ratio(frequency_hz))
 
 
 def coupled_receptance(
@@ -28,43 +135,70 @@ def transfer_of_roughness(transfer: ArrayLike, approach: ArrayLike, spring: Arra
     return np.asarray(across * stiffness / (1.0 + stiffness * relative))
 
 
-def share_of_receptance(
-    frequencies_hz: ArrayLike, approach: ArrayLike, stiffness: float
-) -> list[tuple[float, float]]:
-    """Return frequency [Hz] and contact's share of the strain energy of every coupled mode.
+def receptance_modes(
+    receptances: Receptances, contact: Callable[[float], tuple[float, float]]
+) -> tuple[CoupledMode, ...]:
+    """Return the modes of measured receptances with the contact, within the measured frequencies.
 
-    Modes lie where 1 + k Re H vanishes and H passes smoothly; the share is -2 H/(ω dH/dω) there.
-    Values between the frequencies follow a cubic spline through 1/Re H, which has no poles at the
-    modes of the structure without contact but at its antiresonances. The frequencies must lie
-    closer together than the contact moves a mode.
+    A mode is a complex root of 1/H + k + iωc of a rational fit of H; with mass-normalised shapes
+    the slope there is -2ω over the square of the approach. Modes of which the contact has less than
+    a thousandth are left out: with noise, such roots are no modes.
 
     Parameters
     ----------
-    frequencies_hz : increasing, shape (n,)
-    approach : receptance of the contact without its spring [m/N], (n,)
-    stiffness : of the contact [N/m]
-
-    Raises
-    ------
-    BadInput
-        for fewer than four frequencies, or frequencies that do not increase.
+    contact : returns stiffness and damping of the contact [N/m, N s/m] at a frequency [Hz]
     """
-    frequency_hz = np.asarray(frequencies_hz, dtype=float)
-    receptance = np.real(np.asarray(approach))
-    if frequency_hz.size < 4 or np.any(np.diff(frequency_hz) <= 0.0):
-        raise BadInput(
-            "receptances need four or more increasing frequencies; sort and complete them"
-        )
-    values = 1.0 / receptance
-    inverse = scipy.interpolate.CubicSpline(frequency_hz, values)
-    slope = inverse.derivative()
-    # 1/H falls between its poles; across a pole it rises
-    falling = np.append(np.diff(values) < 0.0, False)
-    roots = inverse.solve(-stiffness, extrapolate=False)
-    before = np.searchsorted(frequency_hz, roots, side="right") - 1
-    # of H = 1/q, H/(dH/df) = -q/q'
-    return [
-        (float(root), float(2.0 * inverse(root) / (root * slope(root))))
-        for root, place in zip(roots, before, strict=True)
-        if falling[place] and slope(root) < 0.0
-    ]
+    frequencies_hz = receptances.frequencies_hz
+    fit = rational_fit(frequencies_hz, receptances.approach)
+    springs = np.array([_spring(contact, complex(entry)) for entry in fit.support])
+    modes: dict[int, CoupledMode] = {}
+    for start in fit.roots_of(1.0 + springs * fit.values):
+        root = _settled(fit, contact, complex(start))
+        if root is None or not frequencies_hz[0] <= root.real <= frequencies_hz[-1]:
+            continue
+        mode = _mode(receptances, fit, contact, root)
+        if mode.contact_share > MIN_SHARE and abs(root.imag) < MAX_DAMPING * root.real:
+            modes[round(math.log(mode.frequency_hz) / SAME_MODE)] = mode
+    return tuple(sorted(modes.values(), key=lambda mode: mode.frequency_hz))
+
+
+def _mode(
+    receptances: Receptances,
+    fit: RationalFit,
+    contact: Callable[[float], tuple[float, float]],
+    root: complex,
+) -> CoupledMode:
+    """Return the mode at a complex root."""
+    stiffness, damping = contact(root.real)
+    slope = -fit.slope(root) / fit(root) ** 2  # of 1/H
+    share = (-2.0 * stiffness / (root * slope)).real
+    in_contact = 2.0 * math.pi * abs(root) * math.sqrt(max(share, 0.0) / stiffness)
+    return CoupledMode(
+        frequency_hz=abs(root),
+        damping_ratio=max(root.imag, 0.0) / abs(root),
+        contact_share=share,
+        contact_shape=in_contact,
+        sensor_shape=in_contact * receptances.ratio_at(root.real).real,
+        stiffness=stiffness,
+        damping=damping,
+    )
+
+
+def _spring(contact: Callable[[float], tuple[float, float]], frequency_hz: complex) -> complex:
+    stiffness, damping = contact(frequency_hz.real)
+    return stiffness + 2j * math.pi * frequency_hz * damping
+
+
+def _settled(
+    fit: RationalFit, contact: Callable[[float], tuple[float, float]], root: complex
+) -> complex | None:
+    """Return a root of 1/H + k + iωc by Newton's method; None if it does not settle."""
+    for _ in range(MAX_STEPS):
+        if not root.real > 0.0:
+            return None
+        value = fit(root)
+        step = (1.0 / value + _spring(contact, root)) / (-fit.slope(root) / value**2)
+        root -= step
+        if abs(step) < SETTLED * abs(root):
+            return root
+    return None
