@@ -5,10 +5,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from asperity import results, structure
+from asperity import report, results, structure
 from asperity.cli.app import app
 from asperity.cli.options import AsJson, Overrides, Quiet, chosen_case
 from asperity.cli.output import Block, columns, show, solver_progress
+from asperity.core import files
 
 if TYPE_CHECKING:
     from asperity.results import SensorView
@@ -21,14 +22,21 @@ def observe(
         Path | None,
         typer.Option(
             "--structure",
-            metavar="FILE",
-            help="Structure without its contact: matrices, modes or measured receptances "
-            "(default: the mass of [vibration] alone).",
+            metavar="FILE|NAME",
+            help="Structure without its contact: bodies, matrices, modes or measured receptances, "
+            "or a built-in one: fzg-gears, paper-rig, roller-bearing-rotor, twin-disc (default: "
+            "the mass of [vibration] alone).",
         ),
     ] = None,
     resolution: Annotated[
         float, typer.Option(help="Relative resolution of a frequency; 0.001 is 0.1 %.")
     ] = 0.001,
+    figures: Annotated[
+        Path | None,
+        typer.Option(
+            "--figures", metavar="DIR", help="Folder for response.png: sensor over roughness."
+        ),
+    ] = None,
     overrides: Overrides = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -42,7 +50,20 @@ def observe(
     case = chosen_case(path, overrides)
     with solver_progress("observe", quiet=quiet) as progress:
         view = results.observe_contact(case, named, resolution=resolution, progress=progress)
-    show(view.verdict(), view.scalars, _rows(view), as_json=as_json, quiet=quiet)
+    drawn = [] if figures is None else [_draw(view, figures)]
+    show(
+        view.verdict(),
+        lambda: view.scalars() | {"figures": drawn},
+        _rows(view),
+        as_json=as_json,
+        quiet=quiet,
+    )
+
+
+def _draw(view: "SensorView", folder: Path) -> str:
+    """Draw the response of the sensor; return the path of the figure."""
+    files.make_folder(folder)
+    return str(report.write_figure(view.plot().figure, folder / "response.png"))
 
 
 def _rows(view: "SensorView") -> Block:

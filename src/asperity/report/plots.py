@@ -19,11 +19,12 @@ from asperity.report.machine.contact_path import along_path
 from asperity.report.machine.sketch import machine_sketch
 from asperity.report.motion.exhibits import curves as motion_curves
 from asperity.report.run.contact import centre_line, contact_map, film_map, pressure_map
+from asperity.report.sensor_view import response_figure
 from asperity.report.study.page import study_exhibits
 from asperity.report.style import BLUE, ON_PAGE, Medium
 from asperity.report.track.exhibits import amplitude, levels, trend
 from asperity.report.wear.exhibits import curves as wear_curves
-from asperity.results import Run
+from asperity.results import Run, SensorView
 from asperity.simulation import History, WearHistory
 from asperity.solution import contact_state
 from asperity.study import StudyOverview, StudyResult
@@ -109,6 +110,11 @@ def _(surface: Surface) -> Mapping[str, Draw]:
 @drawings_of.register
 def _(spectrum: Spectrum) -> Mapping[str, Draw]:
     return {"density": partial(_density, spectrum)}
+
+
+@drawings_of.register
+def _(view: SensorView) -> Mapping[str, Draw]:
+    return {"response": partial(response_figure, view)}
 
 
 def _height_map(surface: Surface, medium: Medium) -> Figure:

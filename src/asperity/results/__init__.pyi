@@ -1,3 +1,7 @@
+from .contact_course import ContactCourse as ContactCourse
+from .contact_course import ContactSpring as ContactSpring
+from .contact_course import contact_spring as contact_spring
+from .contact_course import solve_course as solve_course
 from .curves import FrictionCurve as FrictionCurve
 from .curves import FrictionCurveKind as FrictionCurveKind
 from .curves import FrictionPoint as FrictionPoint

@@ -5,13 +5,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from asperity.case import Case
+from asperity.core.arrays import Field
+from asperity.core.displayed import Displayed
 from asperity.core.errors import BadInput
 from asperity.ehl import Iteration
+from asperity.results.contact_course import BAND_HZ, ContactCourse, solve_course
 from asperity.results.run import Run
-from asperity.results.solve import solve_case
-from asperity.solution import OscillatingContact
 from asperity.structure import (
     CoupledMode,
     NamedStructure,
@@ -22,10 +24,7 @@ from asperity.structure import (
     settled_modes,
 )
 
-ROUGHNESS_FACTORS = (1.25, 1.0, 0.8)  # of Sq, from rough to worn
 RESOLUTION = 1e-3  # relative, of a frequency
-BAND_HZ = (50.0, 20_000.0)  # of the modes
-FREQUENCIES = 6  # at which the contact's stiffness and damping are computed
 MAX_MODES = 12
 MIN_SHARE = 0.05  # of the contact: modes with less say little about it
 
@@ -65,15 +64,47 @@ class ObservedMode:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SensorView:
-    """Modes of a structure with its contact; `sq` [m] and `clr` over the course of wear."""
+class SensorView(Displayed):
+    """Modes of a structure with its contact, over the course of wear."""
 
-    case: Case
+    course: ContactCourse = field(repr=False)
     named: NamedStructure = field(repr=False)
     resolution: float
-    sq: tuple[float, ...]
-    clr: tuple[float, ...]
     modes: tuple[ObservedMode, ...]
+
+    @property
+    def sq(self) -> tuple[float, ...]:
+        """Roughness over the course [m]."""
+        return self.course.sq
+
+    @property
+    def clr(self) -> tuple[float, ...]:
+        """Load share of the asperities over the course."""
+        return self.course.clr
+
+    @property
+    def measured_band_hz(self) -> tuple[float, float] | None:
+        """First and last frequency of measured receptances; None for another structure."""
+        structure = self.named.structure
+        if not isinstance(structure, Receptances):
+            return None
+        return float(structure.frequencies_hz[0]), float(structure.frequencies_hz[-1])
+
+    def response(self, frequencies_hz: ArrayLike) -> Field:
+        """Return the displacement at the sensor per displacement that roughness imposes.
+
+        The absolute value, shape (roughnesses, n); of measured receptances only within their band.
+        """
+        structure = self.named.structure
+        return np.array(
+            [
+                [
+                    abs(_response(structure, spring(frequency_hz), frequency_hz))
+                    for frequency_hz in np.atleast_1d(frequencies_hz).tolist()
+                ]
+                for spring in self.course.springs
+            ]
+        )
 
     @property
     def visible(self) -> tuple[ObservedMode, ...]:
@@ -133,7 +164,7 @@ class SensorView:
 
 
 def observe_contact(
-    case: Case,
+    case: Case | ContactCourse,
     named: NamedStructure | None = None,
     *,
     resolution: float = RESOLUTION,
@@ -141,10 +172,9 @@ def observe_contact(
 ) -> SensorView:
     """Compute the modes of a structure with the contact of a case, as its roughness wears.
 
-    The contact is a snapshot of standing roughness, with 1.25, 1 and 0.8 times its Sq.
-
     Parameters
     ----------
+    case : the case, or its contacts from `solve_course`, which serve for several structures
     named : the structure, from `load_structure`; None: the mass of [vibration] on the contact
     resolution : relative resolution of a frequency
     progress : called after every solver iteration
@@ -160,58 +190,47 @@ def observe_contact(
     """
     if not 0.0 < resolution < 1.0:
         raise BadInput(f"resolution must be between 0 and 1, got {resolution:g}; 0.001 is 0.1 %")
-    named = named or _single_mass(case)
-    still = case.with_written({"contact.roughness": "standing", "solver.surfaces": 1})
-    sq = still.surface().sq
-    scalable = hasattr(still.contents.surface, "sq") and still.stored is None
-    factors = ROUGHNESS_FACTORS if scalable and sq > 0.0 else (1.0,)
-    runs = [
-        solve_case(
-            still if factor == 1.0 else still.with_overrides({"surface.sq": factor * sq}),
-            groups=(),
-            progress=progress,
-        )
-        for factor in factors
-    ]
-    shares = tuple(run.state.clr for run in runs)
-    own = factors.index(1.0)
+    named = named or _single_mass(case if isinstance(case, Case) else case.case)
+    course = solve_course(case, progress=progress) if isinstance(case, Case) else case
     return SensorView(
-        case=case,
+        course=course,
         named=named,
         resolution=resolution,
-        sq=tuple(factor * sq for factor in factors),
-        clr=shares,
-        modes=_observed(named.structure, runs, own),
+        modes=_observed(named.structure, course),
     )
 
 
 def _observed(
-    structure: Structure | Receptances, runs: Sequence[Run], own: int
+    structure: Structure | Receptances, course: ContactCourse
 ) -> tuple[ObservedMode, ...]:
-    """Return the modes in the band over the course of `runs`, of which `own` is the case's own."""
-    courses = [_modes(structure, run) for run in runs]
-    shares = [run.state.clr for run in runs]
+    """Return the modes in the band over the course."""
+    modes = [
+        receptance_modes(structure, spring)
+        if isinstance(structure, Receptances)
+        else settled_modes(structure, spring)
+        for spring in course.springs
+    ]
     observed = []
-    for number, mode in enumerate(courses[own]):
+    for number, mode in enumerate(modes[course.own]):
         if not BAND_HZ[0] <= mode.frequency_hz <= BAND_HZ[1]:
             continue
         over_course = tuple(
-            course[number].frequency_hz
-            if len(course) == len(courses[own])
+            at_roughness[number].frequency_hz
+            if len(at_roughness) == len(modes[course.own])
             # of receptances, a mode may leave the measured frequencies
             else min(
-                (other.frequency_hz for other in course),
+                (other.frequency_hz for other in at_roughness),
                 key=lambda frequency_hz: abs(frequency_hz - mode.frequency_hz),
                 default=mode.frequency_hz,
             )
-            for course in courses
+            for at_roughness in modes
         )
         observed.append(
             ObservedMode(
                 mode=mode,
                 frequencies_hz=over_course,
-                shift_per_clr=_slope(shares, over_course),
-                amplitude_at_sensor=_amplitude(structure, runs[own], mode),
+                shift_per_clr=_slope(course.clr, over_course),
+                amplitude_at_sensor=_amplitude(structure, course.runs[course.own], mode),
             )
         )
     return tuple(observed[:MAX_MODES])
@@ -225,25 +244,6 @@ def _single_mass(case: Case) -> NamedStructure:
     return NamedStructure(
         name=f"the single mass of {mass:g} kg", structure=Structure.single_mass(mass)
     )
-
-
-def _modes(structure: Structure | Receptances, run: Run) -> tuple[CoupledMode, ...]:
-    """Return all modes with the contact's stiffness and damping at their frequencies."""
-    contact = OscillatingContact(run.solution)
-    grid = np.geomspace(*BAND_HZ, FREQUENCIES)
-    values = [contact.evaluate(float(frequency_hz)) for frequency_hz in grid]
-    stiffness, damping = ([getattr(v, name) for v in values] for name in ("stiffness", "damping"))
-
-    def spring(frequency_hz: float) -> tuple[float, float]:
-        place = math.log(min(max(frequency_hz, grid[0]), grid[-1]))
-        return (
-            float(np.interp(place, np.log(grid), stiffness)),
-            float(np.interp(place, np.log(grid), damping)),
-        )
-
-    if isinstance(structure, Receptances):
-        return receptance_modes(structure, spring)
-    return settled_modes(structure, spring)
 
 
 def _slope(shares: Sequence[float], frequencies_hz: Sequence[float]) -> float | None:
@@ -263,9 +263,14 @@ def _amplitude(structure: Structure | Receptances, run: Run, mode: CoupledMode) 
     if 2.0 * frequency_hz > vibration.profile.rate_hz:
         return None
     density = vibration.excitation.density(np.array([frequency_hz]), vibration.profile.rate_hz)
-    response = (
-        structure.response(mode.stiffness, mode.damping, frequency_hz)
-        if isinstance(structure, Receptances)
-        else sensor_response(structure, mode.stiffness, mode.damping, frequency_hz)
-    )
+    response = _response(structure, (mode.stiffness, mode.damping), frequency_hz)
     return (2.0 * math.pi * frequency_hz) ** 2 * abs(response) * math.sqrt(float(density[0]))
+
+
+def _response(
+    structure: Structure | Receptances, spring: tuple[float, float], frequency_hz: float
+) -> complex:
+    """Return the displacement at the sensor per displacement that roughness imposes."""
+    if isinstance(structure, Receptances):
+        return structure.response(*spring, frequency_hz)
+    return sensor_response(structure, *spring, frequency_hz)

@@ -1,6 +1,8 @@
+from .bodies import structure_of_bodies as structure_of_bodies
 from .files import NamedStructure as NamedStructure
 from .files import SensorNoise as SensorNoise
 from .files import load_structure as load_structure
+from .files import machine_structures as machine_structures
 from .matrices import Structure as Structure
 from .modes import CoupledMode as CoupledMode
 from .modes import coupled_modes as coupled_modes

@@ -1,4 +1,4 @@
-"""Structure of a file: matrices, modes or measured receptances, in TOML, csv or netCDF."""
+"""Structure of a file: bodies, matrices, modes or receptances, in TOML, csv or netCDF."""
 
 import csv
 import tomllib
@@ -14,11 +14,13 @@ from asperity.core.errors import BadInput, UnreadableFile, install_text
 from asperity.core.files import require_file
 from asperity.core.sandbox import read_in_subprocess
 from asperity.core.storage import read_netcdf
+from asperity.structure.bodies import BODY_KEYS, structure_of_bodies
 from asperity.structure.matrices import Structure
 from asperity.structure.rational import Complex
 from asperity.structure.receptance import Receptances
 from asperity.structure.universal_file import FREQUENCY_RESPONSE, POWER_SPECTRUM, REMEDY, Function
 
+MACHINES = Path(__file__).parent / "machines"
 MAX_BYTES = 20_000_000  # of a file: matrices of a thousand degrees of freedom
 MATRIX_KEYS = ("mass", "stiffness", "damping", "contact", "sensor")
 MODE_KEYS = ("frequency_hz", "damping_ratio", "contact", "sensor")
@@ -50,22 +52,30 @@ class NamedStructure:
     noise: SensorNoise | None = None
 
 
+def machine_structures() -> tuple[str, ...]:
+    """Return the names of the built-in structures, each with a data sheet of its numbers."""
+    return tuple(sorted(path.stem for path in MACHINES.glob("*.toml")))
+
+
 def load_structure(path: str | Path) -> NamedStructure:
-    """Load a structure in SI units.
+    """Load a structure in SI units from a file, or a built-in one by its name.
 
     A file has one of
 
+    - bodies and springs, see `structure_of_bodies`,
     - the matrices `mass`, `stiffness` and perhaps `damping`, with `contact` and `sensor`,
     - modes: `frequency_hz`, `damping_ratio`, `contact` and `sensor`,
     - receptances: `frequency_hz`, `approach_real`, `approach_imag`, `transfer_real` and
       `transfer_imag`,
 
-    as variables of netCDF, as columns of csv (not matrices), or as keys of TOML, where modes stand
-    in `[modes]`. `[receptances]` in TOML names a universal `file` (data set 58, function type 4)
-    and in it `body_1`, perhaps `body_2`, and `sensor`, each as node and axis such as "11Z", both
-    bodies along one axis. Missing responses from body 1 or the sensor to body 2 count as 0, as of
-    separate bodies. The power spectrum of the sensor (type 9) is the noise. TOML and the
-    attributes of netCDF may state `name` and `noise` [m/s²/√Hz].
+    as keys of TOML, where modes stand in `[modes]`; all but bodies also as variables of netCDF, and
+    modes and receptances as columns of csv. TOML and the attributes of netCDF may state `name` and
+    `noise` [m/s²/√Hz].
+
+    `[receptances]` in TOML names a universal `file` (data set 58, function type 4) and in it
+    `body_1`, perhaps `body_2`, and `sensor`, each as node and axis such as "11Z", both bodies along
+    one axis. Missing responses from body 1 or the sensor to body 2 count as 0, as of separate
+    bodies. The power spectrum of the sensor (type 9) is the noise.
 
     Raises
     ------
@@ -75,6 +85,13 @@ def load_structure(path: str | Path) -> NamedStructure:
         for missing or unknown keys, a universal file without the extra `recordings`, and as
         `Structure` and `Receptances`.
     """
+    if str(path) in machine_structures():
+        path = MACHINES / f"{path}.toml"
+    elif not Path(path).suffix:
+        raise BadInput(
+            f"structure {str(path)!r} is not built in; use {', '.join(machine_structures())}, or "
+            "name a file"
+        )
     path = Path(path)
     require_file(path)
     if path.stat().st_size > MAX_BYTES:
@@ -126,6 +143,8 @@ def _structure(content: Content) -> Structure | Receptances:
             approach=parts[0] + 1j * parts[1],
             transfer=parts[2] + 1j * parts[3],
         )
+    if "bodies" in content:
+        return structure_of_bodies(content)
     if "frequency_hz" in content:
         frequencies_hz, ratios, contact, sensor = (_numbers(content, key) for key in MODE_KEYS)
         return Structure.from_modes(frequencies_hz, ratios, contact=contact, sensor=sensor)
@@ -166,7 +185,9 @@ def _read_toml(path: Path) -> Content:
     except (OSError, ValueError, RecursionError) as error:
         raise UnreadableFile(f"{path} is not valid TOML: {error}") from None
     try:
-        _require_keys("the file", content, ("name", "noise", *MATRIX_KEYS, "modes", "receptances"))
+        known = ("name", "noise", "modes", "receptances")
+        kind = BODY_KEYS if "bodies" in content else MATRIX_KEYS
+        _require_keys("the file", content, (*known, *kind))
     except BadInput as error:
         raise BadInput(f"{path}: {error}") from None
     return content
