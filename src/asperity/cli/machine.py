@@ -29,6 +29,7 @@ from asperity.core.errors import AsperityError
 from asperity.core.quantities import NO_VALUE, UNKNOWN, mark_rolling, quantity
 
 if TYPE_CHECKING:
+    from asperity.case import MachineCase
     from asperity.core.quantities import Quantity
     from asperity.machines import MachineResult
 
@@ -71,6 +72,15 @@ def machine_command(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Print the contacts' conditions without solving.")
     ] = False,
+    stiffness: Annotated[
+        Path | None,
+        typer.Option(
+            "--stiffness",
+            metavar="FILE.csv",
+            help="Write stiffness and damping at every point of [study] for rotor dynamics, "
+            "instead of solving the machine.",
+        ),
+    ] = None,
     figures: Figures = None,
     opened: OpenPage = False,
     as_json: AsJson = False,
@@ -80,6 +90,9 @@ def machine_command(
     page = None if out is None or dry_run else out / PAGE
     require_opened(page, requested=opened, option="--out DIR, without --dry-run")
     chosen = case.load_machine(path, read_overrides(overrides, snapshot=snapshot))
+    if stiffness is not None:
+        _tabulate(chosen, stiffness, as_json=as_json, quiet=quiet)
+        return
     if dry_run:
         result = machines.machine_conditions(chosen)
     else:
@@ -104,6 +117,24 @@ def machine_command(
             f"{len(result.failures)} of {len(result.rows)} contacts were not solved; the first: "
             f"{result.failures[0]['name']}: {result.failures[0]['reason']}"
         )
+
+
+def _tabulate(chosen: "MachineCase", path: Path, *, as_json: bool, quiet: bool) -> None:
+    """Write the table of stiffness and damping."""
+    files.require_writable(path)
+    with progress("stiffness", "solving ...", quiet=quiet) as display:
+        result = machines.stiffness_table(
+            chosen,
+            progress=lambda done, total: display(f"{done} of {total} contacts", done, total),
+        )
+    result.write(path)
+    show(
+        result.verdict(),
+        lambda: result.scalars() | {"table": str(path)},
+        written("Table", path),
+        as_json=as_json,
+        quiet=quiet,
+    )
 
 
 def _save(result: "MachineResult", out: Path, *, quiet: bool) -> None:

@@ -63,7 +63,7 @@ def observe(
 def _draw(view: "SensorView", folder: Path) -> str:
     """Draw the response of the sensor; return the path of the figure."""
     files.make_folder(folder)
-    return str(report.write_figure(view.plot().figure, folder / "response.png"))
+    return str(report.write_figure(report.draw_result(view), folder / "response.png"))
 
 
 def _rows(view: "SensorView") -> Block:

@@ -4,6 +4,8 @@ from .result import MachineResult as MachineResult
 from .result import merge_symmetric as merge_symmetric
 from .solve import machine_conditions as machine_conditions
 from .solve import solve_machine as solve_machine
+from .stiffness_table import StiffnessTable as StiffnessTable
+from .stiffness_table import stiffness_table as stiffness_table
 from .sweep import MachineSweep as MachineSweep
 from .sweep import sweep_machine as sweep_machine
 from .sweep import sweep_points as sweep_points

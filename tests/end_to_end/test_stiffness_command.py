@@ -1,0 +1,36 @@
+"""`asperity machine --stiffness`: the table for rotor dynamics."""
+
+import json
+
+BALLS = """
+lubricant = { grade = "VG 68", temperature = "70 degC" }
+surface = "flat"
+machine.kind = "ball-bearing"
+machine.balls = 9
+machine.ball_diameter = "9.525 mm"
+machine.pitch_diameter = "46 mm"
+machine.radial_load = "2 kN"
+machine.speed = "3000 r/min"
+grid.cells = [64, 48]
+"""
+
+
+def test_the_table_has_a_row_for_each_point_of_the_study(tmp_path, asp):
+    path = tmp_path / "machine.toml"
+    path.write_text(BALLS, "utf-8")
+    study = "study.machine.speed=['1000 r/min', '3000 r/min']".replace("'", '"')
+    out = tmp_path / "bearing.csv"
+    code, printed, _ = asp(
+        *("machine", str(path), "--stiffness", str(out), "--set", study, "--json")
+    )
+    assert code == 0
+    result = json.loads(printed)
+    assert [row["machine.speed"] for row in result["rows"]] == ["1000 r/min", "3000 r/min"]
+    assert result["table"] == str(out)
+    heading, *rows = out.read_text("utf-8").splitlines()
+    assert heading == "machine.speed,frequency,kxx,kxy,kyx,kyy,cxx,cxy,cyx,cyy"
+    assert len(rows) == 2
+    slow, fast = result["rows"]
+    assert fast["kxx"] < slow["kxx"]  # the film grows
+    code, _, err = asp("machine", str(path), "--stiffness", str(tmp_path / "table.xlsx"))
+    assert (code, "a stiffness table is written as .csv, got table.xlsx" in err) == (2, True)
