@@ -300,3 +300,31 @@ def test_a_page_shows_observations_forecast_and_design(tmp_path):
     ):
         assert words in text
     assert text.count("<img") == 6
+
+
+CAPACITANCES = """load_n,entrainment_m_s,capacitance_f,capacitance_std_f
+450,1.5,2.4e-10,5e-12
+550,2.5,2.1e-10,5e-12
+"""
+
+
+def test_capacitances_replace_or_join_recordings(asp, small):
+    _, _, folder = small
+    Path("infer.toml").write_text(load_case(EXAMPLE).with_overrides(SMALL).text, "utf-8")
+    Path("capacitance.csv").write_text(CAPACITANCES, "utf-8")
+    arguments = ("infer", "--case", "infer.toml", "--emulator", str(folder), "--json")
+    code, out, err = asp(*arguments, "--capacitance", "capacitance.csv", "--report", "page.html")
+    assert not err
+    result = json.loads(out)
+    assert code == 0
+    assert result["observations"] == 2
+    assert [point["load_n"] for point in result["points"]] == [450.0, 550.0]
+    assert result["posterior"]["h_mean_m"]["information_bits"] > 0.0
+    assert Path("page.html").exists()
+    Path("capacitance.csv").write_text(CAPACITANCES.replace("2.4e-10", "much"), "utf-8")
+    code, _, err = asp(*arguments, "--capacitance", "capacitance.csv")
+    assert code == 2
+    assert "capacitance.csv, line 2: capacitance_f must be a number, got 'much'" in err
+    Path("capacitance.csv").write_text("load_n\n1\n", "utf-8")
+    code, _, err = asp(*arguments, "--capacitance", "capacitance.csv")
+    assert (code, "needs rows with the columns load_n, entrainment_m_s" in err) == (2, True)

@@ -40,8 +40,8 @@ def formula_setting(**overrides: object) -> Setting:
 
 
 def formula(x: np.ndarray, sq: np.ndarray) -> dict[str, np.ndarray]:
-    """Return shares, film, friction, stiffness and damping of a contact with film ratio 1.6 exp(4
-    x).
+    """Return shares, film, friction, stiffness, damping and capacitance of a contact with
+    film ratio 1.6 exp(4 x).
     """
     film = 1.6 * np.exp(4.0 * x)
     share = 1.0 / (1.0 + film**2.5)
@@ -52,6 +52,7 @@ def formula(x: np.ndarray, sq: np.ndarray) -> dict[str, np.ndarray]:
         "friction_coefficient": 0.02 + 0.13 * share,
         "contact_stiffness_n_m": 3.3e8 * (1.0 + 0.02 * share),
         "contact_damping_ratio": 0.03 * (1.0 - share),
+        "capacitance_f": 2e-16 / (film * sq),
     }
 
 

@@ -29,7 +29,11 @@ from asperity.inference import (
     with_observation,
 )
 from asperity.inference import emulator as emulator_module
-from asperity.inference.estimates import information_gain, quantity_estimate
+from asperity.inference.estimates import (
+    information_gain,
+    quantity_estimate,
+    quantity_estimates,
+)
 from asperity.inference.gaussian_process import GaussianProcess, fit_process
 from asperity.inference.likelihood import (
     COMMON_SHARE,
@@ -159,11 +163,13 @@ def test_priors_have_the_stated_quantiles():
 
 @pytest.mark.parametrize("discrepancy", [True, False])
 def test_the_likelihood_is_the_multivariate_normal(discrepancy):
-    """Three channels, each with its own size of the law's error; covariances written out."""
+    """Four channels, each with its own size of the law's error; covariances written out."""
     rng = np.random.default_rng(2)
-    crf, damping, crfa, log_force = rng.standard_normal((4, 3, 4))
-    stds = rng.uniform(0.1, 0.3, (3, 3, 4))
-    predicted = ChannelPrediction(crf, stds[0], damping, stds[1], crfa, stds[2], log_force)
+    crf, damping, crfa, log_force, capacitance = rng.standard_normal((5, 3, 4))
+    stds = rng.uniform(0.1, 0.3, (4, 3, 4))
+    predicted = ChannelPrediction(
+        crf, stds[0], damping, stds[1], crfa, stds[2], log_force, capacitance, stds[3]
+    )
     measured = [
         LogMeasurement(0.3, 0.2),
         LogMeasurement(),
@@ -171,7 +177,9 @@ def test_the_likelihood_is_the_multivariate_normal(discrepancy):
         LogMeasurement(1.0, 0.1),
     ]
     points = [
-        ObservationPoint(500.0 * 1.01**i, 1.0, crf=value, damping=value, crfa=value)
+        ObservationPoint(
+            500.0 * 1.01**i, 1.0, crf=value, damping=value, crfa=value, capacitance=value
+        )
         for i, value in enumerate(measured)
     ]
     used = [0, 2, 3]
@@ -180,10 +188,20 @@ def test_the_likelihood_is_the_multivariate_normal(discrepancy):
     for row in range(3):
         force, expected = log_force[row, used], 0.0
         steep = EXPONENT_STD * discrepancy * (force - force.mean())
-        common = {"crf": np.outer(steep, steep), "damping": 0.0, "crfa": GAIN_STD**2}
-        emulator_std = {"crf": 0.0, "damping": 0.0, "crfa": EMULATED_HEIGHT_STD}
+        common = {
+            "crf": np.outer(steep, steep),
+            "damping": 0.0,
+            "crfa": GAIN_STD**2,
+            "capacitance": 0.0,
+        }
+        emulator_std = {
+            "crf": 0.0,
+            "damping": 0.0,
+            "crfa": EMULATED_HEIGHT_STD,
+            "capacitance": 0.0,
+        }
         for number, (channel, weight) in enumerate(
-            {"crf": 1.0, "damping": 5.0, "crfa": 10.0}.items()
+            {"crf": 1.0, "damping": 5.0, "crfa": 10.0, "capacitance": 2.0}.items()
         ):
             std = np.hypot(stds[number, row, used], emulator_std[channel])
             known = common[channel] + np.outer(std, std) * (
@@ -432,6 +450,48 @@ def test_adding_one_recording_agrees_with_the_joint_inference(setting, emulator,
     )
 
 
+def test_a_capacitance_alone_gives_the_film(setting, emulator):
+    """C ∝ 1/film: with an exact law the film is known like the capacitance, and CLR follows."""
+    z = np.zeros((1, len(setting.unknowns)))
+    point = ObservationPoint(500.0, 2.0, capacitance=LogMeasurement(0.0, 1.0))
+    forward = ForwardModel(setting, emulator, (point,))
+    log_capacitance = float(forward.predict(z, "hertz-point").capacitance[0, 0])
+    film = float(forward.states(z, ["h_mean_m"])["h_mean_m"][0, 0])
+    value = float(np.exp(log_capacitance))
+    measured = Observation(
+        load_n=500.0, entrainment_m_s=2.0, capacitance_f=value, capacitance_std_f=0.01 * value
+    )
+    found = infer_observations(setting, emulator, [measured])
+    before = infer_observations(setting, emulator, [])
+    (at_point,) = found.point_estimates()
+    exact = np.quantile(found.exact.states["h_mean_m"][:, 1], [0.05, 0.95])
+    assert exact == pytest.approx(film * np.array([0.98, 1.02]), rel=0.02)
+    estimate = at_point.state["h_mean_m"]
+    assert estimate.low < film < estimate.high
+    prior = quantity_estimates(
+        before.values(before.prior),
+        before.values(before.prior),
+        before.draws.effective,
+        frozenset(),
+    )["h_mean_m"]
+    assert estimate.high / estimate.low < (prior.high / prior.low) ** 0.6
+    assert found.posterior()["h_mean_m"].learnt
+    assert "frequency" not in found.reason
+
+
+def test_a_capacitance_narrows_what_a_resonance_leaves_open(setting, emulator, one_point):
+    point = ObservationPoint(500.0, 2.0, capacitance=LogMeasurement(0.0, 1.0))
+    forward = ForwardModel(setting, emulator, (point,))
+    z = truth(setting)
+    value = float(np.exp(forward.predict(z, "hertz-point").capacitance[0, 0]))
+    measured = Observation(
+        load_n=500.0, entrainment_m_s=2.0, capacitance_f=value, capacitance_std_f=0.02 * value
+    )
+    both = infer_observations(setting, emulator, [*one_point.observations, measured])
+    narrow, wide = both.posterior()["h_mean_m"], one_point.posterior()["h_mean_m"]
+    assert narrow.high / narrow.low < 0.6 * wide.high / wide.low
+
+
 def test_repeats_reduce_the_deviation_no_further_than_their_scatter(setting, emulator):
     first = simulated_observations(setting, emulator, SIX_POINTS[:1])[0]
     repeats = [replace(first, crf_hz=first.crf_hz * factor) for factor in (0.98, 1.0, 1.02)]
@@ -464,7 +524,8 @@ def test_practically_equal_loads_do_not_reduce_the_model_error():
         )
         crf = 8.0 + error + np.zeros_like(missing)
         predicted = ChannelPrediction(
-            crf, np.full_like(crf, 0.01), missing, missing, missing, missing, log_force
+            *(crf, np.full_like(crf, 0.01), *(missing,) * 4, log_force),
+            *(missing, missing),
         )
         weights = np.exp(log_likelihood(predicted, points, discrepancy=True))
         return np.sqrt(weights @ error[:, 0] ** 2 / weights.sum())

@@ -73,6 +73,13 @@ TableFileOption = Annotated[
         help="Table with columns file, load_n, entrainment_m_s, temperature_degc.",
     ),
 ]
+CapacitanceOption = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="CSV",
+        help="Measured capacitances: load_n, entrainment_m_s, capacitance_f, capacitance_std_f.",
+    ),
+]
 ExtendOption = Annotated[
     int,
     typer.Option(
@@ -100,6 +107,7 @@ def infer(
     snapshot: StandingRoughness = False,
     surface: SurfaceFile = None,
     table_file: TableFileOption = None,
+    capacitance: CapacitanceOption = None,
     emulator: EmulatorFolder = None,
     extend: ExtendOption = 0,
     sampler: SamplerOption = "importance",
@@ -123,7 +131,12 @@ def infer(
 ) -> None:
     """Infer the state of a contact from recordings, with intervals."""
     case_file = _required(
-        case_file, paths, sampler=sampler, forecast=forecast, worn=worn, design=design
+        case_file,
+        paths or ([] if capacitance is None else [capacitance]),
+        sampler=sampler,
+        forecast=forecast,
+        worn=worn,
+        design=design,
     )
     setting, surface_notes = _setting(case_file, overrides, surface, snapshot=snapshot)
     limit = _limit(forecast, setting, worn)
@@ -135,6 +148,9 @@ def infer(
     forecaster = partial(_forecast, setting, observations, *limit, seed)
     ahead = forecaster(initial)
     latest = _latest(observations, ahead, surface_notes)
+    if capacitance is not None:
+        measured = inference.read_capacitances(capacitance)
+        latest = replace(latest, observations=(*latest.observations, *measured))
     result = _infer(setting, initial, latest, sampler, seed, extend, count, quiet=quiet)
     if result.emulator is not initial:
         ahead = forecaster(result.emulator)
@@ -225,7 +241,9 @@ def _required(
         raise BadInput("asperity infer needs a case; state --case CASE.toml")
     require_forecast(forecast, worn=worn)
     if not paths and (design is None or forecast is not None):
-        raise BadInput("asperity infer needs recordings; name files, or their folder")
+        raise BadInput(
+            "asperity infer needs recordings; name files, their folder, or --capacitance"
+        )
     require_choice("--sampler", sampler, inference.SAMPLERS)
     if design is not None:
         inference.require_share("--design", design)

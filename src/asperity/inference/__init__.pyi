@@ -1,3 +1,4 @@
+from .capacitance_input import read_capacitances as read_capacitances
 from .design import Design as Design
 from .design import DesignVariable as DesignVariable
 from .design import design_contact as design_contact

@@ -20,7 +20,7 @@ from asperity.core.quantities import quantity
 from asperity.coupling import NoiseExcitation
 from asperity.inference.emulator import Emulator, EmulatorGridError
 from asperity.inference.observations import ObservationPoint
-from asperity.inference.outputs import CAR, CLR, DAMPING, OUTPUTS, STIFFNESS
+from asperity.inference.outputs import CAPACITANCE, CAR, CLR, DAMPING, OUTPUTS, STIFFNESS
 from asperity.inference.priors import Unknown, share_of
 from asperity.inference.settings import GRID_ERROR, LOAD, OFFSET, SPEED, TEMPERATURE, Setting
 
@@ -43,6 +43,8 @@ class ChannelPrediction(NamedTuple):
     crfa: Field
     crfa_std: Field
     log_force: Field
+    capacitance: Field
+    capacitance_std: Field
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,7 @@ class ForwardModel:
     @cached_property
     def observed(self) -> "ForwardModel":
         """The model at the measured operating points only; at all points if none was measured."""
-        measured = tuple(point for point in self.points if not math.isnan(point.crf.value))
+        measured = tuple(point for point in self.points if point.measured)
         return replace(self, points=measured) if measured else self
 
     def unknown(self, z: Field, key: str, known: float) -> Field:
@@ -145,6 +147,8 @@ class ForwardModel:
     def required_outputs(self, law: Law, *, heights: bool = True) -> tuple[str, ...]:
         """Return the emulator outputs that a law needs."""
         required: tuple[str, ...] = (CLR,) if law == "hertz-point" else (STIFFNESS, DAMPING)
+        if any(not math.isnan(point.capacitance.value) for point in self.points):
+            required = (*required, CAPACITANCE)
         return (*required, CAR) if heights and self._noise_excited else required
 
     @property
@@ -188,6 +192,7 @@ class ForwardModel:
         crfa_std = np.full(crf.shape, np.nan)
         if heights and self._noise_excited:
             crfa, crfa_std = self._log_crfa(z, crf, spring.damping, emulated[CAR])
+        absent = np.full(crf.shape, np.nan), np.full(crf.shape, np.nan)
         return ChannelPrediction(
             crf,
             0.5 * spring.stiffness_std,
@@ -196,6 +201,7 @@ class ForwardModel:
             crfa,
             crfa_std,
             spring.log_force,
+            *emulated.get(CAPACITANCE, absent),
         )
 
     def _sphere(

@@ -139,7 +139,7 @@ class Inference(Brief):
         """Return the contact's state at each measured operating point."""
         results = []
         for index, point in enumerate(self.forward.points):
-            if np.isnan(point.crf.value):
+            if not point.measured:
                 continue
             after = self.values(self.draws, index)
             before = self.values(self.prior, index)
@@ -188,6 +188,11 @@ class Inference(Brief):
         ]
 
     @property
+    def resonant(self) -> bool:
+        """True if a contact resonance was measured, not capacitances alone."""
+        return any(not np.isnan(point.crf.value) for point in self.forward.points)
+
+    @property
     def reason(self) -> str:
         """Reason why CLR or Sq is not identified; empty if both are."""
         if not self.observations:
@@ -200,7 +205,7 @@ class Inference(Brief):
         names = " and ".join(quantity(key).short for key in unidentified)
         gains = " and ".join(f"{estimates[key].information_bits:.1f}" for key in unidentified)
         reasons = [f"{names}: information gain {gains} bits"]
-        if points == 1:
+        if points == 1 and self.resonant:
             reasons.append("one operating point gives one frequency, which many contacts share")
         confounded = self._confounded()
         if confounded:

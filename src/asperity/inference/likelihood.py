@@ -2,10 +2,10 @@
 
 Without discrepancy, errors are those of measurement and emulator; the emulator's error is partly
 common to all operating points and fully common to similar ones. With discrepancy, the law has an
-error in frequency, damping and height, each of unknown size (three equally probable sizes). Half of
-its variance is a function of the spring's force; the other half is specific to an operating point
-and common to similar ones. The law's exponent of the load is uncertain too. CRFA has an unknown
-gain common to all recordings.
+error in frequency, damping, height and capacitance, each of unknown size (three equally probable
+sizes). Half of its variance is a function of the spring's force; the other half is specific to an
+operating point and common to similar ones. The law's exponent of the load is uncertain too. CRFA
+has an unknown gain common to all recordings.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,8 +18,9 @@ from asperity.inference.forward import ChannelPrediction
 from asperity.inference.observations import ObservationPoint, point_similarity
 
 SIZES = (0.005, 0.02, 0.08)  # of the law's error, relative to CRF: 3, 12 and 60 % of a load share
-# size of the error in ln ζ and ln CRFA, relative to that in ln CRF
-WEIGHTS: Mapping[str, float] = {"crf": 1.0, "damping": 5.0, "crfa": 10.0}
+# size of the error in ln ζ, ln CRFA and ln capacitance, relative to that in ln CRF; the last
+# allows for permittivity and stray capacitance, 1, 4 or 16 %
+WEIGHTS: Mapping[str, float] = {"crf": 1.0, "damping": 5.0, "crfa": 10.0, "capacitance": 2.0}
 POINT_SHARE = 0.5  # fraction of the law's variance specific to an operating point
 FORCE_LENGTH = 1.0  # correlation length of the other part, in ln force
 EXPONENT_STD = 0.03  # of the exponent of the load in CRF: the difference of 1/5 and 1/6
@@ -169,7 +170,7 @@ def law_errors(
 
     Parameters
     ----------
-    channel : "crf", "damping" or "crfa"
+    channel : "crf", "damping", "crfa" or "capacitance"
     log_force : (n, points)
     size : (n,), relative to CRF; 0 for an exact law
     similarity : of the points, see `point_similarity`

@@ -17,29 +17,33 @@ SIMILARITY_SCALES = np.array([0.03, 0.03, 1.5])
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Observation:
-    """A recording's contact resonance and its operating point.
+    """Measurements of a contact at an operating point: its resonance, its capacitance, or both.
 
     Parameters
     ----------
     load_n, entrainment_m_s : load [N] and entrainment speed [m/s] of the contact
     temperature_k : of the oil [K]; None: that of the case
-    crf_hz, crf_std_hz : resonance frequency and its standard deviation [Hz]
+    crf_hz, crf_std_hz : resonance frequency and its standard deviation [Hz]; nan if not measured
     crfa, crfa_std : height of the resonance [(m/s^2)^2/Hz]; nan if not comparable
     damping_ratio, damping_std : from the width of the resonance; nan if not determined
     crf_shared_std_hz : part of `crf_std_hz` common to all recordings at the operating point
+    capacitance_f, capacitance_std_f : of the contact without the stray capacitance of its
+        surroundings, and its standard deviation [F]; nan if not measured
     name, x : label, and position in a series (hours)
     """
 
     load_n: float
     entrainment_m_s: float
-    crf_hz: float
-    crf_std_hz: float
+    crf_hz: float = MISSING
+    crf_std_hz: float = MISSING
     temperature_k: float | None = None
     crfa: float = MISSING
     crfa_std: float = MISSING
     damping_ratio: float = MISSING
     damping_std: float = MISSING
     crf_shared_std_hz: float = 0.0
+    capacitance_f: float = MISSING
+    capacitance_std_f: float = MISSING
     name: str = ""
     x: float = MISSING
 
@@ -47,16 +51,20 @@ class Observation:
         prefix = f"{self.name}: " if self.name else ""
         require_positive(f"{prefix}load_n", self.load_n, "N")
         require_positive(f"{prefix}entrainment_m_s", self.entrainment_m_s, "m/s")
-        require_positive(f"{prefix}crf_hz", self.crf_hz, "Hz")
-        require_positive(f"{prefix}crf_std_hz", self.crf_std_hz, "Hz")
+        if math.isnan(self.capacitance_f):
+            require_positive(f"{prefix}crf_hz", self.crf_hz, "Hz")
         for name, value, std in (
+            ("crf_hz", self.crf_hz, self.crf_std_hz),
+            ("capacitance_f", self.capacitance_f, self.capacitance_std_f),
             ("crfa", self.crfa, self.crfa_std),
             ("damping_ratio", self.damping_ratio, self.damping_std),
         ):
             if not math.isnan(value):
                 require_positive(f"{prefix}{name}", value)
                 require_positive(f"{prefix}standard deviation of {name}", std)
-        if not 0.0 <= self.crf_shared_std_hz <= self.crf_std_hz * (1.0 + 1e-9):
+        if self.crf_shared_std_hz and not (
+            0.0 <= self.crf_shared_std_hz <= self.crf_std_hz * (1.0 + 1e-9)
+        ):
             raise BadInput(
                 f"{prefix}crf_shared_std_hz must be at most crf_std_hz, {self.crf_std_hz:g} Hz, "
                 f"got {self.crf_shared_std_hz:g} Hz"
@@ -88,7 +96,13 @@ class ObservationPoint:
     crf: LogMeasurement = field(default_factory=LogMeasurement)
     damping: LogMeasurement = field(default_factory=LogMeasurement)
     crfa: LogMeasurement = field(default_factory=LogMeasurement)
+    capacitance: LogMeasurement = field(default_factory=LogMeasurement)
     names: tuple[str, ...] = ()
+
+    @property
+    def measured(self) -> bool:
+        """True if a resonance or a capacitance was measured here."""
+        return not (math.isnan(self.crf.value) and math.isnan(self.capacitance.value))
 
 
 def operating_points(observations: Sequence[Observation]) -> tuple[ObservationPoint, ...]:
@@ -112,6 +126,9 @@ def operating_points(observations: Sequence[Observation]) -> tuple[ObservationPo
             ),
             damping=_combined([(entry.damping_ratio, entry.damping_std, 0.0) for entry in group]),
             crfa=_combined([(entry.crfa, entry.crfa_std, 0.0) for entry in group]),
+            capacitance=_combined(
+                [(entry.capacitance_f, entry.capacitance_std_f, 0.0) for entry in group]
+            ),
             names=tuple(entry.name for entry in group),
         )
         for conditions, group in groups.items()

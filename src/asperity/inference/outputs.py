@@ -58,6 +58,7 @@ FILM = "h_mean_m"
 FRICTION = "friction_coefficient"
 STIFFNESS = "contact_stiffness_n_m"
 DAMPING = "contact_damping_ratio"
+CAPACITANCE = "capacitance_f"
 OUTPUTS: Mapping[str, Output] = {
     output.key: output
     for output in (
@@ -67,5 +68,6 @@ OUTPUTS: Mapping[str, Output] = {
         _positive(FRICTION),
         _positive(STIFFNESS),
         _signed(DAMPING, DAMPING_FLOOR),
+        _positive(CAPACITANCE),
     )
 }

@@ -67,7 +67,7 @@ def render_inference_page(
         meanings=[_meaning(inference, key) for key in posterior],
         marginals=exhibits.marginals(inference).picture(),
         pairs=exhibits.pairs(inference).picture(),
-        predicted=exhibits.predicted(inference).picture() if inference.observations else None,
+        predicted=exhibits.predicted(inference).picture() if inference.resonant else None,
         next_recording=exhibits.next_recording(inference).picture(),
         rows=_posterior_rows(inference),
         heads=PointEstimates.HEADS,
@@ -97,7 +97,7 @@ def inference_exhibits(
     return [
         exhibits.marginals(inference),
         exhibits.pairs(inference),
-        *([exhibits.predicted(inference)] if inference.observations else []),
+        *([exhibits.predicted(inference)] if inference.resonant else []),
         exhibits.next_recording(inference),
         *([] if forecast is None else [_forecast_exhibit(forecast)]),
         *([] if design is None else [exhibits.design_changes(design)]),

@@ -1,0 +1,195 @@
+"""Capacitance as evidence: intervals of CLR on simulated machines in thin films.
+
+True contacts are new solutions (not the emulator's), means over twelve surfaces, with unknowns
+drawn from the priors of examples/infer.toml, of standing roughness, at 500 N and 1.91 m/s where the
+emulator's film ratio lies between 1 and 3. A machine's CRF follows the paper's spring under the
+true load share (none below 1 %), known to 0.5 %, its damping to 10 %. The capacitance is that of
+the solved contacts with an error of permittivity of 5 % that the inference does not know, read to
+2 %. Each machine is inferred without and with it. `python -m benchmarks.evidence --machines 100`.
+"""
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas
+
+from asperity.case import load_case
+from asperity.contact.hertz import point_stiffness
+from asperity.core.arrays import Field
+from asperity.core.coverage import QUANTILES
+from asperity.inference import (
+    Emulator,
+    Observation,
+    Setting,
+    build_emulator,
+    infer_observations,
+    inference_setting,
+)
+from asperity.study import overrides_at, plan_points, run_study
+from benchmarks.rows import FOLDER
+
+CASE = Path(__file__).parents[1] / "examples" / "infer.toml"
+KEPT = Path(__file__).parents[1] / "build" / "evidence"
+ROWS = FOLDER / "evidence-machines.csv"
+MACHINES, FEW, SEED, SURFACES = 100, 6, 33, 12
+FILM_RATIOS = 1.0, 3.0
+MIN_SHARE = 0.01  # of the load, below which there is no resonance
+CRF_STD, DAMPING_STD = 0.005, 0.1
+CAPACITANCE_STD, PERMITTIVITY_STD = 0.02, 0.05
+SPEED = 1.91
+
+
+def main() -> None:
+    """Solve, infer, and print coverage and width of intervals."""
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("--machines", type=int, default=MACHINES)
+    parsed = arguments.parse_args()
+    table = judged(parsed.machines)
+    table.to_csv(ROWS, index=False)
+    print("\n".join(tables(table)))
+
+
+def lines(*, fast: bool, seconds: float = float("inf")) -> Iterator[str]:  # noqa: ARG001
+    """Yield the output of `python -m benchmarks evidence`."""
+    yield from tables(judged(FEW) if fast else pandas.read_csv(ROWS))
+
+
+def judged(machines: int) -> pandas.DataFrame:
+    """Return a row per machine: truth, and intervals without and with the capacitance."""
+    case = load_case(CASE).with_overrides({"contact.roughness": "standing"})
+    setting = inference_setting(case)
+    emulator = replace(build_emulator(setting, folder=KEPT / "emulator", workers=2), grid={})
+    unknowns = list(drawn(setting, emulator, machines))
+    points = [
+        overrides_at(
+            setting.case,
+            [unknown.range for unknown in setting.contact],
+            [float(unknown.share(z[place])) for place, unknown in enumerate(setting.contact)],
+        )
+        for z in unknowns
+    ]
+    plain = setting.case.with_overrides({"vibration": "none"})
+    study = run_study(
+        plan_points(plain, points, seeds=SURFACES, kind="still"), out=KEPT / "truth", workers=2
+    )
+    done = study.table[study.table["status"] == "done"].groupby("point")
+    means = done[["clr", "capacitance_f", "h_mean_m", "sq_m"]].mean()
+    complete = done.size() == SURFACES
+    return pandas.DataFrame(
+        [
+            row(setting, emulator, number, unknowns[number], means.loc[number])
+            for number in means.index[complete]
+        ]
+    )
+
+
+def drawn(setting: Setting, emulator: Emulator, count: int) -> Iterator[Field]:
+    """Yield unknowns from the priors with a film ratio in the range."""
+    rng = np.random.default_rng(SEED)
+    while count:
+        z = rng.standard_normal(len(setting.unknowns))
+        if FILM_RATIOS[0] < film_ratio(setting, emulator, z) < FILM_RATIOS[1]:
+            count -= 1
+            yield z
+
+
+def film_ratio(setting: Setting, emulator: Emulator, z: Field) -> float:
+    """Return the emulator's mean film over Sq."""
+    found = infer_point(setting, emulator, z)
+    return found["h_mean_m"] / found["sq_m"]
+
+
+def infer_point(setting: Setting, emulator: Emulator, z: Field) -> dict[str, float]:
+    """Return the emulator's film at the case's own load and speed, and Sq."""
+    from asperity.inference import ForwardModel, ObservationPoint
+
+    conditions = setting.case.conditions
+    point = ObservationPoint(conditions.load, conditions.entrainment_speed)
+    forward = ForwardModel(setting, emulator, (point,))
+    film = forward.states(z[None, :], ["h_mean_m"])["h_mean_m"][0, 0]
+    return {"h_mean_m": float(film), "sq_m": float(forward.unknown(z[None, :], "sq_m", 1.0)[0])}
+
+
+def row(
+    setting: Setting, emulator: Emulator, number: int, z: Field, truth: pandas.Series
+) -> dict[str, float]:
+    """Return the truth of a machine, and the ends of its intervals of CLR."""
+    rng = np.random.default_rng([SEED, number])
+    conditions = setting.case.conditions
+    values = {
+        unknown.key: float(unknown.value(z[i : i + 1])[0])
+        for i, unknown in enumerate(setting.unknowns)
+    }
+    clr, where = float(truth["clr"]), {
+        "load_n": conditions.load,
+        "entrainment_m_s": conditions.entrainment_speed,
+    }
+    scale = float(truth["capacitance_f"]) * np.exp(
+        PERMITTIVITY_STD * rng.standard_normal() + CAPACITANCE_STD * rng.standard_normal()
+    )
+    electric = Observation(
+        **where, capacitance_f=scale, capacitance_std_f=CAPACITANCE_STD * scale, name="capacitance"
+    )
+    resonances = []
+    if clr >= MIN_SHARE:
+        stiffness = point_stiffness(
+            clr * conditions.load, conditions.radius_along_rolling, conditions.pair.reduced_modulus
+        )
+        crf_hz = np.sqrt(stiffness / values["mass_kg"]) / (2.0 * np.pi)
+        crf_hz *= np.exp(CRF_STD * rng.standard_normal())
+        damping = values["damping_ratio"] * np.exp(DAMPING_STD * rng.standard_normal())
+        resonances.append(
+            Observation(
+                **where,
+                crf_hz=float(crf_hz),
+                crf_std_hz=float(CRF_STD * crf_hz),
+                damping_ratio=float(damping),
+                damping_std=float(DAMPING_STD * damping),
+                name="resonance",
+            )
+        )
+    ends = {}
+    for name, observations in (("without", resonances), ("with", [*resonances, electric])):
+        found = infer_observations(setting, emulator, observations, seed=number)
+        draws = found.draws.states["clr"][:, 0] if observations else found.prior.states["clr"][:, 0]
+        low, high = np.quantile(draws, [QUANTILES[0], QUANTILES[-1]])
+        ends |= {f"clr_{name}_low": float(low), f"clr_{name}_high": float(high)}
+    return {
+        "machine": number,
+        "film_ratio": float(truth["h_mean_m"]) / values["sq_m"],
+        "clr": clr,
+        "capacitance_f": float(truth["capacitance_f"]),
+        "resonance": len(resonances),
+        **ends,
+    }
+
+
+def tables(table: pandas.DataFrame) -> Iterator[str]:
+    """Yield the table of widths and coverage."""
+    yield "| film ratio | machines | with a resonance | width of CLR without, with capacitance | ratio (median) | coverage without, with |"
+    yield "|---|---|---|---|---|---|"
+    for low, high in ((1.0, 1.5), (1.5, 2.0), (2.0, 3.0), FILM_RATIOS):
+        part = table[(table["film_ratio"] >= low) & (table["film_ratio"] < high)]
+        if not len(part):
+            continue
+        widths = {
+            name: part[f"clr_{name}_high"] - part[f"clr_{name}_low"] for name in ("without", "with")
+        }
+        covered = {
+            name: ((part["clr"] >= part[f"clr_{name}_low"] - 1e-3)
+            & (part["clr"] <= part[f"clr_{name}_high"] + 1e-3)).mean()
+            for name in widths
+        }
+        yield (
+            f"| {low:g} to {high:g} | {len(part)} | {int(part['resonance'].sum())} | "
+            f"{100 * widths['without'].median():.1f}, {100 * widths['with'].median():.1f} points | "
+            f"{(widths['with'] / widths['without']).median():.2f} | "
+            f"{100 * covered['without']:.0f}, {100 * covered['with']:.0f} % |"
+        )
+
+
+if __name__ == "__main__":
+    main()
