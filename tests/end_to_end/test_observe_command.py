@@ -24,7 +24,9 @@ def test_a_mode_of_the_holder_moves_with_the_contact(asp):
     code, out, _ = asp("observe", "case.toml", "--structure", "holder.toml", "--json")
     result = json.loads(out)
     assert code == 0
-    assert set(result) == {"verdict", "structure", "resolution", "visible", "sq_m", "clr", "modes"}
+    assert set(result) == {
+        *("verdict", "structure", "resolution", "visible", "sq_m", "clr", "modes", "figures")
+    }
     assert result["structure"] == "roller in its holder"
     assert result["sq_m"] == pytest.approx([1.25e-6, 1e-6, 0.8e-6])
     assert result["clr"] == sorted(result["clr"], reverse=True)

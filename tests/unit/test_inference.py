@@ -211,6 +211,8 @@ def test_the_likelihood_is_the_multivariate_normal(discrepancy):
             correlated = POINT_SHARE * correlation + (1.0 - POINT_SHARE) * norm.pdf(
                 np.subtract.outer(force, force) / FORCE_LENGTH
             ) / norm.pdf(0.0)
+            if channel == "capacitance":
+                correlated = 0.9 + 0.1 * correlation
             densities = [
                 multivariate_normal(
                     getattr(predicted, channel)[row, used],

@@ -26,6 +26,7 @@ from asperity.coupling import VibrationModel
 from asperity.ehl import ACCURACY, MOST_RUNNING_CELLS, Options, auto_grid, running_cells
 from asperity.lubricant import Lubricant, OilFact, OilSheet, Thermal
 from asperity.solution import Sensing, inlet_notes, plausibility_notes
+from asperity.structure import NamedStructure, load_structure, machine_structures
 from asperity.surface import CompositeSurface, MovingSurfaces, Surface, track_grid
 from asperity.wear import WearModel
 
@@ -66,6 +67,7 @@ class Case(Brief):
             "options",
             "thermal",
             "sensing",
+            "structure",
             "vibration",
             "wear",
         ):
@@ -148,6 +150,15 @@ class Case(Brief):
         """Electrical and acoustic properties."""
         section = self.contents.sensing
         return Sensing() if section is None else section.sensing()
+
+    @cached_property
+    def structure(self) -> NamedStructure | None:
+        """Machine structure around the contact; None for the mass of [vibration] alone."""
+        stated = self.contents.structure
+        if stated is None:
+            return None
+        named = stated in machine_structures() or not Path(stated).suffix
+        return load_structure(stated if named else self.folder / stated)
 
     @cached_property
     def grid(self) -> Grid:

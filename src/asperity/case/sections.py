@@ -152,6 +152,7 @@ class CaseFile(Section):
     solver: SolverSection = SolverSection()
     thermal: ThermalSection = Field(default_factory=ThermalSection)
     sensing: Annotated[SensingSection | None, OPTIONAL] = None
+    structure: Annotated[str | None, OPTIONAL] = None  # file, or name of a built-in one
     vibration: Annotated[Any, PlainValidator(parse_vibration)] = None
     study: Annotated[StudySection | None, PlainValidator(parse_study)] = None
     motion: Annotated[MotionSection | None, OPTIONAL] = None

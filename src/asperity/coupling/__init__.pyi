@@ -40,3 +40,5 @@ from .record import excitation as excitation
 from .spring import damped_oscillator as damped_oscillator
 from .spring import oscillator as oscillator
 from .spring import resonance_at as resonance_at
+from .structural import StructuralResonance as StructuralResonance
+from .structural import structural_resonance as structural_resonance

@@ -31,6 +31,7 @@ from asperity.inference.posterior import (
 from asperity.inference.priors import share_of
 from asperity.inference.recording_input import ObservedSeries, RecordingInput, observe_recordings
 from asperity.inference.settings import Setting, inference_setting
+from asperity.inference.structure_input import on_single_mass
 from asperity.inference.visits import visit_series
 from asperity.simulation import WearHistory, load_wear
 from asperity.study import StudyProgress
@@ -183,7 +184,8 @@ def infer_series(
     sampler: Sampler = "importance",
     seed: int = 0,
 ) -> Inference:
-    """Infer a contact from the result of `observe_recordings`."""
+    """Infer a contact from the result of `observe_recordings`, through its structure if any."""
+    series = on_single_mass(setting, series)
     return infer_observations(
         setting,
         emulator,
@@ -215,6 +217,7 @@ def forecast_series(
         the first recording
     x_name : label of x; that of the track if there is one
     """
+    series = on_single_mass(setting, series)
     x_name = series.track.x_name if series.track is not None else x_name
     times = [observation.x for observation in series.observations]
     drift = None

@@ -21,6 +21,7 @@ SIZES = (0.005, 0.02, 0.08)  # of the law's error, relative to CRF: 3, 12 and 60
 # size of the error in ln ζ, ln CRFA and ln capacitance, relative to that in ln CRF; the last
 # allows for permittivity and stray capacitance, 1, 4 or 16 %
 WEIGHTS: Mapping[str, float] = {"crf": 1.0, "damping": 5.0, "crfa": 10.0, "capacitance": 2.0}
+ELECTRIC_SHARE = 0.1  # the same of the capacitance: permittivity and stray capacitance are common
 POINT_SHARE = 0.5  # fraction of the law's variance specific to an operating point
 FORCE_LENGTH = 1.0  # correlation length of the other part, in ln force
 EXPONENT_STD = 0.03  # of the exponent of the load in CRF: the difference of 1/5 and 1/6
@@ -176,7 +177,12 @@ def law_errors(
     similarity : of the points, see `point_similarity`
     pivot : ln force at which the exponent has no effect; by default the mean of the points
     """
-    errors = (WEIGHTS[channel] * size[:, None, None]) ** 2 * law_correlations(log_force, similarity)
+    correlations = (
+        1.0 - ELECTRIC_SHARE + ELECTRIC_SHARE * similarity
+        if channel == "capacitance"
+        else law_correlations(log_force, similarity)
+    )
+    errors = (WEIGHTS[channel] * size[:, None, None]) ** 2 * correlations
     if channel == "crf":
         pivot = log_force.mean(axis=1, keepdims=True) if pivot is None else pivot
         exponent_error = EXPONENT_STD * (log_force - pivot) * (size[:, None] > 0.0)

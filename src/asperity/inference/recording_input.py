@@ -9,7 +9,7 @@ import numpy as np
 
 from asperity.case import Case
 from asperity.core.documents import Table
-from asperity.coupling import search_band
+from asperity.coupling import search_band, structural_resonance
 from asperity.inference.observations import Observation
 from asperity.inference.settings import LOAD, Setting
 from asperity.monitoring import (
@@ -107,13 +107,14 @@ def resonance_band(setting: Setting) -> tuple[float, float]:
     model = setting.case.vibration
     assert model is not None
     loads = next(entry for entry in setting.operating if entry.key == LOAD)
-    bands = [
-        search_band(
-            setting.case.with_written(overrides_at(setting.case, [loads], [end])).conditions,
-            model,
-        )
-        for end in (0.0, 1.0)
-    ]
+    structure = setting.case.structure
+    bands = []
+    for end in (0.0, 1.0):
+        at_load = setting.case.with_written(overrides_at(setting.case, [loads], [end])).conditions
+        if structure is None:
+            bands.append(search_band(at_load, model))
+        else:
+            bands.append(structural_resonance(structure.structure, at_load, model).band_hz)
     low, high = bands[0][0], bands[1][1]
     mass = next((unknown for unknown in setting.unknowns if unknown.key == "mass_kg"), None)
     if mass is None:

@@ -20,7 +20,7 @@ from asperity.monitoring.reading import WINDOW, Reading
 from asperity.monitoring.recording import TrackedRecording
 from asperity.monitoring.series_state import PreviousStates, SeriesMemory
 from asperity.monitoring.settings import TrackSettings
-from asperity.monitoring.states import contact_evidence
+from asperity.monitoring.states import contact_evidence, unresponsive_mode
 from asperity.monitoring.target import Target
 from asperity.monitoring.track_result import Track
 from asperity.recording import ACCELERATION
@@ -220,8 +220,8 @@ def _staged(
         of_contact=bool(evidence),
     )
     tracked = _with_states(tracked, stages, source, response, alarm)
-    if target.full_load_crf_hz is not None:
-        tracked = _with_load_share(tracked, target.full_load_crf_hz)
+    if target.full_load_crf_hz is not None and not unresponsive_mode(target):
+        tracked = _with_load_share(tracked, target)
     return Track(
         recordings=tuple(tracked),
         x_name=x_name,
@@ -233,7 +233,12 @@ def _staged(
         evidence=evidence,
         comparable=units == {ACCELERATION},
         problems=comparability([_facts_of(recording) for recording in series.used]),
-        notes=(*notes, *_notes(tracked, units, response), *remounted),
+        notes=(
+            *filter(None, [unresponsive_mode(target)]),
+            *notes,
+            *_notes(tracked, units, response),
+            *remounted,
+        ),
     )
 
 
@@ -286,14 +291,21 @@ def _incomparable_units(units: set[str]) -> list[str]:
     ]
 
 
-def _with_load_share(
-    tracked: Sequence[TrackedRecording], full_load_crf_hz: float
-) -> list[TrackedRecording]:
+def _with_load_share(tracked: Sequence[TrackedRecording], target: Target) -> list[TrackedRecording]:
     """Add the asperities' load share and its 90 % interval, as the contact model reads CRF."""
     crf, crf_std = np.array(
         [(recording.resonance.crf_hz, recording.resonance.crf_std) for recording in tracked]
     ).T
-    share = asperity_load_share(crf, np.where(np.isfinite(crf_std), crf_std, 0.0), full_load_crf_hz)
+    crf_std, full_load_crf_hz = (
+        np.where(np.isfinite(crf_std), crf_std, 0.0),
+        target.full_load_crf_hz,
+    )
+    assert full_load_crf_hz is not None
+    if target.structural is not None:
+        crf_std = crf_std * target.structural.single_mass_slope(crf)
+        crf = target.structural.on_single_mass(crf)
+        full_load_crf_hz = target.structural.springs[1].natural_frequency_hz
+    share = asperity_load_share(crf, crf_std, full_load_crf_hz)
     return [
         replace(recording, clr=float(clr), clr_interval=(float(low), float(high)))
         for recording, clr, low, high in zip(tracked, share.clr, *share.interval, strict=True)

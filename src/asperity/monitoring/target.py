@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 from asperity.case import Case, MachineCase
 from asperity.core.errors import BadInput, require_positive
-from asperity.coupling import BAND_MARGIN, search_band
+from asperity.coupling import BAND_MARGIN, StructuralResonance, search_band, structural_resonance
 from asperity.paper import papers_case
 
 SHAFTS = ("shaft_hz", "pinion_hz", "cam_hz", "disc_1_hz")  # shafts with a speed in the case
@@ -20,13 +20,15 @@ class Target:
     `full_load_crf_hz` the resonance with all load on asperities, None without a contact model.
     `source` states the origin of the band; `assumed` is true if the user gave neither case nor
     band; `case` is the contact. `rates_per_turn` are the fault frequencies as shaft orders, by
-    name, and `shaft_hz` is the shaft's speed in the case.
+    name, and `shaft_hz` is the shaft's speed in the case. `structural` is the mode that follows the
+    contact, if the case has a structure.
     """
 
     band_hz: tuple[float, float]
     width_hz: float
     full_load_crf_hz: float | None
     source: str
+    structural: StructuralResonance | None = field(default=None, repr=False, compare=False)
     assumed: bool = False
     case: Case | None = field(default=None, repr=False, compare=False)
     rates_per_turn: Mapping[str, float] = field(default_factory=dict)
@@ -66,12 +68,22 @@ def search_target(
             f"{contact.source}: [vibration] is missing; add it with mass and damping_ratio, "
             "or give a band"
         )
-    searched = search_band(contact.conditions, contact.vibration)
+    model, structure = contact.vibration, contact.structure
+    structural = None
+    damping_ratio = model.damping_ratio
+    if structure is None:
+        searched = search_band(contact.conditions, model)
+    else:
+        structural = structural_resonance(structure.structure, contact.conditions, model)
+        searched, damping_ratio = structural.band_hz, structural.damping_ratio
     full_load = None if case is None else searched[1] / (1.0 + BAND_MARGIN)
     if band_hz is not None:
         searched = (low, high)
     elif case is not None:
-        source = f"{searched[0]:.0f} to {searched[1]:.0f} Hz, from the contact of {case.source}"
+        inside = "" if structure is None else f" in {structure.name}"
+        source = (
+            f"{searched[0]:.0f} to {searched[1]:.0f} Hz, from the contact of {case.source}{inside}"
+        )
     else:
         source = (
             f"{searched[0]:.0f} to {searched[1]:.0f} Hz, that of the paper's contact, because "
@@ -79,11 +91,12 @@ def search_target(
         )
     return Target(
         band_hz=searched,
-        width_hz=2.0 * contact.vibration.damping_ratio * searched[0],
+        width_hz=2.0 * damping_ratio * searched[0],
         full_load_crf_hz=full_load,
         source=source,
         assumed=case is None and band_hz is None,
         case=case,
+        structural=structural,
     )
 
 

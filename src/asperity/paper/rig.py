@@ -17,7 +17,14 @@ from asperity.contact.conditions import ContactConditions
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, require_choice, require_positive
 from asperity.core.limits import require_affordable
-from asperity.coupling import STIFFNESS_LAWS, VibrationModel, dry_full_load, oscillator, search_band
+from asperity.coupling import (
+    STIFFNESS_LAWS,
+    VibrationModel,
+    dry_full_load,
+    oscillator,
+    search_band,
+    structural_resonance,
+)
 from asperity.ehl import ContactState
 from asperity.paper.contact import papers_contact, rig_case
 from asperity.paper.numbers import (
@@ -38,6 +45,7 @@ from asperity.paper.rig_recording import (
     contact_line,
     draw_background,
 )
+from asperity.structure import NamedStructure
 
 RigTrend = Literal["knee", "smooth", "constant"]
 
@@ -169,7 +177,7 @@ def simulate_rig(
     disturbance : signals besides the contact, drawn anew for each seed; default `Disturbance()`
     case : its contact, solved at each Sq, gives load and area shares instead of the trend; its
         load, radius, mass, damping (for the damping law "contact" that of the solved contact) and
-        excitation define the line
+        excitation define the line; its structure, if it has one, the modes
     moments : states of that case's contact as it wears, one sample each, instead of contacts solved
         at each Sq
 
@@ -184,9 +192,10 @@ def simulate_rig(
     if moments:
         settings = replace(settings, samples=len(moments))
     conditions, model = _contact(case)
-    band_hz = _band(conditions, model, settings.rate_hz)
+    structure = None if case is None else case.structure
+    band_hz = _band(conditions, model, settings.rate_hz, structure)
     sq, sq_std = _measured(settings.samples, moments, settings.seed)
-    full_load_crf_hz = _full_load_crf_hz(conditions, model, float(sq[0]))
+    full_load_crf_hz = _full_load_crf_hz(conditions, model, float(sq[0]), structure)
     disturbance = disturbance or Disturbance()
     rings = _Rings(settings, case, moments, conditions, model, full_load_crf_hz)
     readings = list(zip(sq.tolist(), sq_std.tolist(), strict=True))
@@ -260,11 +269,19 @@ class _Rings(NamedTuple):
         shift = self.settings.repeat_std_hz * rng.standard_normal() / self.full_load_crf_hz
         shifted = _shifted(state, shift)
         rate_hz = self.settings.rate_hz
-        return contact_line(shifted, self.conditions, model, self.frequency, rate_hz)
+        structure = None if self.case is None else self.case.structure
+        return contact_line(shifted, self.conditions, model, self.frequency, rate_hz, structure)
 
 
-def _full_load_crf_hz(conditions: ContactConditions, model: VibrationModel, sq: float) -> float:
+def _full_load_crf_hz(
+    conditions: ContactConditions,
+    model: VibrationModel,
+    sq: float,
+    structure: NamedStructure | None,
+) -> float:
     """Return the resonance with all load on asperities [Hz]."""
+    if structure is not None:
+        return structural_resonance(structure.structure, conditions, model).full_load_hz
     full_load = replace(dry_full_load(conditions, sq), clr=1.0)
     return oscillator(
         full_load, conditions, model.with_choices(damping_law="ratio")
@@ -315,10 +332,16 @@ def _touching(moment: Moment) -> ContactState:
 
 
 def _band(
-    conditions: ContactConditions, model: VibrationModel, rate_hz: float
+    conditions: ContactConditions,
+    model: VibrationModel,
+    rate_hz: float,
+    structure: NamedStructure | None,
 ) -> tuple[float, float]:
     """Return the search band [Hz], if the sampling rate resolves it."""
-    band_hz = search_band(conditions, model)
+    if structure is None:
+        band_hz = search_band(conditions, model)
+    else:
+        band_hz = structural_resonance(structure.structure, conditions, model).band_hz
     if rate_hz < MIN_RATE_RATIO * band_hz[1]:
         minimum = f"{MIN_RATE_RATIO:g} times the upper end of the search band, {band_hz[1]:.0f} Hz"
         raise BadInput(

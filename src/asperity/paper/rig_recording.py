@@ -12,9 +12,10 @@ from asperity.contact.conditions import ContactConditions
 from asperity.core.arrays import Field, Mask
 from asperity.core.errors import BadInput
 from asperity.core.signals import Signal, Spectrum, power_spectrum, taper
-from asperity.coupling import VibrationModel, excitation, oscillator
+from asperity.coupling import VibrationModel, excitation, oscillator, structural_resonance
 from asperity.ehl import ContactState
 from asperity.paper.numbers import SHAFT_HZ
+from asperity.structure import NamedStructure, sensor_response
 
 MAINS_HZ = 50.0
 RING_HARMONICS, MAINS_HARMONICS = 40, 20
@@ -224,21 +225,37 @@ def contact_line(
     model: VibrationModel,
     frequency: Field,
     rate_hz: float,
+    structure: NamedStructure | None = None,
 ) -> ContactLine:
-    """Return the contact's line: |H|^2 of the oscillator times the excitation's spectrum."""
+    """Return the contact's line: |H|^2 of the oscillator times the excitation's spectrum.
+
+    In a structure H is that from roughness to the sensor, and the line that of the mode which
+    follows the contact.
+    """
     spring = oscillator(state, conditions, model)
     base_excitation = excitation(state, conditions, model)
-    f0 = spring.natural_frequency_hz
+    f0, damping_ratio = spring.natural_frequency_hz, spring.damping_ratio
+    if structure is not None:
+        resonance = structural_resonance(structure.structure, conditions, model)
+        place = np.log(spring.stiffness)
+        f0 = float(np.exp(resonance.mode.log_frequency(place)))
+        damping_ratio = float(resonance.mode.total_damping(place, spring.damping))
+
+    def gain(at: Field) -> Field:
+        if structure is None:
+            return spring.gain(at)
+        response = sensor_response(structure.structure, spring.stiffness, spring.damping, at)
+        return np.asarray((2.0 * np.pi * at) ** 4 * np.abs(response) ** 2)
 
     def density(at: Field) -> Field:
         return np.asarray(
-            spring.gain(at) * base_excitation.density(at, rate_hz) * _accelerometer(at, rate_hz)
+            gain(at) * base_excitation.density(at, rate_hz) * _accelerometer(at, rate_hz)
         )
 
     measured = np.zeros(frequency.size)
     measured[1:] = density(frequency[1:])
     return ContactLine(
-        state.sq, state.clr, f0, float(density(np.array(f0))), spring.damping_ratio, measured
+        state.sq, state.clr, f0, float(density(np.array([f0]))[0]), damping_ratio, measured
     )
 
 

@@ -15,6 +15,7 @@ from asperity.ehl import Iteration
 from asperity.results.contact_course import BAND_HZ, ContactCourse, solve_course
 from asperity.results.run import Run
 from asperity.structure import (
+    MIN_CONTACT_SHARE,
     CoupledMode,
     NamedStructure,
     Receptances,
@@ -26,7 +27,6 @@ from asperity.structure import (
 
 RESOLUTION = 1e-3  # relative, of a frequency
 MAX_MODES = 12
-MIN_SHARE = 0.05  # of the contact: modes with less say little about it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,16 +95,14 @@ class SensorView(Displayed):
 
         The absolute value, shape (roughnesses, n); of measured receptances only within their band.
         """
-        structure = self.named.structure
-        return np.array(
-            [
-                [
-                    abs(_response(structure, spring(frequency_hz), frequency_hz))
-                    for frequency_hz in np.atleast_1d(frequencies_hz).tolist()
-                ]
-                for spring in self.course.springs
-            ]
-        )
+        places = np.atleast_1d(np.asarray(frequencies_hz, dtype=float))
+        responses = []
+        for spring in self.course.springs:
+            stiffness, damping = np.array([spring(float(place)) for place in places]).T
+            responses.append(
+                np.abs(sensor_response(self.named.structure, stiffness, damping, places))
+            )
+        return np.array(responses)
 
     @property
     def visible(self) -> tuple[ObservedMode, ...]:
@@ -142,7 +140,9 @@ class SensorView(Displayed):
         best = max(self.visible or self.modes, key=lambda observed: observed.movement)
         can = "can" if self.visible else "cannot"
         reason = "" if best.movement <= self.resolution or self.visible else ", below the noise"
-        weak = "" if best.mode.contact_share >= MIN_SHARE else ", which says little about it"
+        weak = (
+            "" if best.mode.contact_share >= MIN_CONTACT_SHARE else ", which says little about it"
+        )
         return (
             f"This sensor {can} see this contact: the mode of {self.named.name} at "
             f"{best.mode.frequency_hz:.0f} Hz moves by {100.0 * best.movement:.2g} % against a "
@@ -175,7 +175,8 @@ def observe_contact(
     Parameters
     ----------
     case : the case, or its contacts from `solve_course`, which serve for several structures
-    named : the structure, from `load_structure`; None: the mass of [vibration] on the contact
+    named : the structure, from `load_structure`; None: that of the case, else the mass of
+        [vibration] on the contact
     resolution : relative resolution of a frequency
     progress : called after every solver iteration
 
@@ -190,7 +191,8 @@ def observe_contact(
     """
     if not 0.0 < resolution < 1.0:
         raise BadInput(f"resolution must be between 0 and 1, got {resolution:g}; 0.001 is 0.1 %")
-    named = named or _single_mass(case if isinstance(case, Case) else case.case)
+    contact = case if isinstance(case, Case) else case.case
+    named = named or contact.structure or _single_mass(contact)
     course = solve_course(case, progress=progress) if isinstance(case, Case) else case
     return SensorView(
         course=course,
@@ -263,14 +265,6 @@ def _amplitude(structure: Structure | Receptances, run: Run, mode: CoupledMode) 
     if 2.0 * frequency_hz > vibration.profile.rate_hz:
         return None
     density = vibration.excitation.density(np.array([frequency_hz]), vibration.profile.rate_hz)
-    response = _response(structure, (mode.stiffness, mode.damping), frequency_hz)
-    return (2.0 * math.pi * frequency_hz) ** 2 * abs(response) * math.sqrt(float(density[0]))
-
-
-def _response(
-    structure: Structure | Receptances, spring: tuple[float, float], frequency_hz: float
-) -> complex:
-    """Return the displacement at the sensor per displacement that roughness imposes."""
-    if isinstance(structure, Receptances):
-        return structure.response(*spring, frequency_hz)
-    return sensor_response(structure, *spring, frequency_hz)
+    (response,) = sensor_response(structure, mode.stiffness, mode.damping, [frequency_hz])
+    motion = (2.0 * math.pi * frequency_hz) ** 2 * float(abs(response))
+    return motion * math.sqrt(float(density[0]))

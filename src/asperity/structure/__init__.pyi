@@ -4,11 +4,14 @@ from .files import SensorNoise as SensorNoise
 from .files import load_structure as load_structure
 from .files import machine_structures as machine_structures
 from .matrices import Structure as Structure
+from .mode_course import MIN_CONTACT_SHARE as MIN_CONTACT_SHARE
+from .mode_course import ContactMode as ContactMode
+from .mode_course import contact_mode as contact_mode
 from .modes import CoupledMode as CoupledMode
 from .modes import coupled_modes as coupled_modes
-from .modes import sensor_response as sensor_response
 from .modes import settled_modes as settled_modes
 from .receptance import Receptances as Receptances
 from .receptance import coupled_receptance as coupled_receptance
 from .receptance import receptance_modes as receptance_modes
 from .receptance import transfer_of_roughness as transfer_of_roughness
+from .response import sensor_response as sensor_response

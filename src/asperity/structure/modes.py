@@ -125,23 +125,3 @@ def settled_modes(
             )
         found.append(mode)
     return tuple(mode for mode in found if lowest_hz <= mode.frequency_hz <= highest_hz)
-
-
-def sensor_response(
-    structure: Structure, stiffness: float, damping: float, frequency_hz: float
-) -> complex:
-    """Return the displacement of the sensor per displacement that roughness imposes.
-
-    Parameters
-    ----------
-    stiffness, damping : of the contact at this frequency [N/m, N s/m]
-    """
-    angular = 2.0 * math.pi * frequency_hz
-    spring = stiffness + 1j * angular * damping
-    dynamic = (
-        structure.stiffness
-        + 1j * angular * structure.damping
-        - angular**2 * structure.mass
-        + spring * np.outer(structure.contact, structure.contact)
-    )
-    return complex(structure.sensor @ np.linalg.solve(dynamic, spring * structure.contact))

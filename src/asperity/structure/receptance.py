@@ -97,23 +97,20 @@ class Receptances:
         ):
             object.__setattr__(self, name, array)
 
-    def response(self, stiffness: float, damping: float, frequency_hz: float) -> complex:
-        """Return the displacement of the sensor per displacement that roughness imposes.
+    def response(
+        self, spring: npt.NDArray[np.complex128], frequencies_hz: Field
+    ) -> npt.NDArray[np.complex128]:
+        """Return the displacement of the sensor per displacement that roughness imposes, (n,).
 
-        Raises
-        ------
-        BadInput
-            for a frequency outside the measured ones.
+        `spring` is k + iωc of the contact [N/m]; beyond the measured frequencies the result is 0.
         """
-        if not self.frequencies_hz[0] <= frequency_hz <= self.frequencies_hz[-1]:
-            raise BadInput(
-                f"{frequency_hz:g} Hz is outside the measured {self.frequencies_hz[0]:g} to "
-                f"{self.frequencies_hz[-1]:g} Hz; state a frequency inside"
-            )
-        spring = stiffness + 2j * math.pi * frequency_hz * damping
         # its poles are the antiresonances alone
         inverse = scipy.interpolate.CubicSpline(self.frequencies_hz, 1.0 / self.approach)
-        return self.ratio_at(frequency_hz) * spring / (complex(inverse(frequency_hz)) + spring)
+        ratio = scipy.interpolate.CubicSpline(self.frequencies_hz, self.transfer / self.approach)
+        low, high = self.frequencies_hz[0], self.frequencies_hz[-1]
+        inside = (frequencies_hz >= low) & (frequencies_hz <= high)
+        at = np.clip(frequencies_hz, low, high)
+        return np.where(inside, ratio(at) * spring / (inverse(at) + spring), 0.0)
 
     def ratio_at(self, frequency_hz: float) -> complex:
         """Return the displacement of the sensor per approach in the contact."""
