@@ -28,6 +28,8 @@ TILES = (
     "flash_temperature_max_k",
     "crf_hz",
     "crfa",
+    "capacitance_f",
+    "ultrasonic_reflection",
 )
 OPEN, TOUCHING, CAVITATED = 0, 1, 2  # state of a cell
 BY_FORMULA = ("lambda_ratio",)  # tiles that do not depend on a solution
