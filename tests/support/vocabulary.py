@@ -79,6 +79,7 @@ class Vocabulary:
                     ),
                     tree,
                 )
+        self.constants |= {path.stem for path in PACKAGE.glob("structure/machines/*.toml")}
         for stub in PACKAGE.rglob("*.pyi"):
             folder = ".".join(("asperity", *stub.parent.relative_to(PACKAGE).parts))
             for node in ast.parse(stub.read_text("utf-8")).body:

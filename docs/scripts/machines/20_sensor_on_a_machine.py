@@ -1,6 +1,6 @@
 """
-What a sensor on a machine sees of a contact
-============================================
+Contact as seen by a sensor on a machine
+========================================
 
 A sensor sees a contact through the modes of the machine around it. Each drawing has the motion at
 the sensor per height of roughness that passes the contact, at three roughnesses. The share of the
@@ -45,5 +45,5 @@ observe_contact(course, load_structure("fzg-gears")).plot()
 # Rotor on roller bearings
 # ------------------------
 
-observe_contact(course, load_structure("roller-bearing-rotor")).plot()
+observe_contact(course, load_structure("roller-bearing")).plot()
 plt.show()

@@ -26,7 +26,7 @@ from asperity.coupling import VibrationModel
 from asperity.ehl import ACCURACY, MOST_RUNNING_CELLS, Options, auto_grid, running_cells
 from asperity.lubricant import Lubricant, OilFact, OilSheet, Thermal
 from asperity.solution import Sensing, inlet_notes, plausibility_notes
-from asperity.structure import NamedStructure, load_structure, machine_structures
+from asperity.structure import NamedStructure, load_structure
 from asperity.surface import CompositeSurface, MovingSurfaces, Surface, track_grid
 from asperity.wear import WearModel
 
@@ -39,6 +39,10 @@ DEFAULT_TRACKS = 1  # of a running contact; a generated track holds several cont
 DEFAULT_TRACKS_MEASURED = 3
 MOST_SURFACES = 1000  # a prediction interval hardly narrows beyond a few dozen
 FINE_GRID = 256 * 256  # cells above which a grid counts as fine
+CHECKED = {  # parts that are checked when a case is loaded, and their names in messages
+    **{"conditions": "contact and material", "options": "solver", "lubricant": "lubricant"},
+    **{key: key for key in ("grid", "thermal", "sensing", "structure", "vibration", "wear")},
+}
 CELL_BYTES, CELL_S = 800.0, 1e-4  # cost of a cell while a contact is solved
 
 
@@ -60,22 +64,10 @@ class Case(Brief):
 
     def __post_init__(self) -> None:
         # report errors now rather than after a long computation
-        for name in (
-            "conditions",
-            "lubricant",
-            "grid",
-            "options",
-            "thermal",
-            "sensing",
-            "structure",
-            "vibration",
-            "wear",
-        ):
+        for name, part in CHECKED.items():
             if name == "grid" and self._is_measured and self.contents.grid.chosen:
                 continue  # would need its file
-            with self.naming(
-                {"conditions": "contact and material", "options": "solver"}.get(name, name)
-            ):
+            with self.naming(part):
                 getattr(self, name)
 
     # the sections of laws are created at run time, which pickle cannot import
@@ -155,10 +147,7 @@ class Case(Brief):
     def structure(self) -> NamedStructure | None:
         """Machine structure around the contact; None for the mass of [vibration] alone."""
         stated = self.contents.structure
-        if stated is None:
-            return None
-        named = stated in machine_structures() or not Path(stated).suffix
-        return load_structure(stated if named else self.folder / stated)
+        return None if stated is None else load_structure(stated, folder=self.folder)
 
     @cached_property
     def grid(self) -> Grid:

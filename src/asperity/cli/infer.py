@@ -132,11 +132,11 @@ def infer(
     """Infer the state of a contact from recordings, with intervals."""
     case_file = _required(
         case_file,
-        paths or ([] if capacitance is None else [capacitance]),
-        sampler=sampler,
-        forecast=forecast,
-        worn=worn,
-        design=design,
+        paths or capacitance,
+        sampler,
+        forecast,
+        worn,
+        design,
     )
     setting, surface_notes = _setting(case_file, overrides, surface, snapshot=snapshot)
     limit = _limit(forecast, setting, worn)
@@ -147,12 +147,9 @@ def infer(
     initial = emulated(setting, emulator, count, quiet=quiet)
     forecaster = partial(_forecast, setting, observations, *limit, seed)
     ahead = forecaster(initial)
-    latest = _latest(observations, ahead, surface_notes)
-    if capacitance is not None:
-        measured = inference.read_capacitances(capacitance)
-        latest = replace(latest, observations=(*latest.observations, *measured))
+    latest = _latest(observations, ahead, surface_notes, capacitance)
     result = _infer(setting, initial, latest, sampler, seed, extend, count, quiet=quiet)
-    if result.emulator is not initial:
+    if extend:
         ahead = forecaster(result.emulator)
     _show(result, ahead, design, (page, figures), opened=opened, as_json=as_json, quiet=quiet)
 
@@ -229,8 +226,7 @@ def _observe(
 
 def _required(
     case_file: Path | None,
-    paths: list[Path] | None,
-    *,
+    measured: list[Path] | Path | None,
     sampler: str,
     forecast: str | None,
     worn: Path | None,
@@ -240,7 +236,7 @@ def _required(
     if case_file is None:
         raise BadInput("asperity infer needs a case; state --case CASE.toml")
     require_forecast(forecast, worn=worn)
-    if not paths and (design is None or forecast is not None):
+    if not measured and (design is None or forecast is not None):
         raise BadInput(
             "asperity infer needs recordings; name files, their folder, or --capacitance"
         )
@@ -251,12 +247,23 @@ def _required(
 
 
 def _latest(
-    observations: "ObservedSeries", ahead: "Forecast | None", notes: tuple[str, ...]
+    observations: "ObservedSeries",
+    ahead: "Forecast | None",
+    notes: tuple[str, ...],
+    capacitance: Path | None,
 ) -> "ObservedSeries":
-    """Return the last tenth of a series whose contact changes, otherwise all of it, with notes."""
+    """Return the last tenth of a series whose contact changes, otherwise all of it, with notes.
+
+    Measured capacitances are added.
+    """
     changes = ahead is not None and ahead.change_detected
     latest = inference.latest_observations(observations) if changes else observations
-    return replace(latest, notes=(*latest.notes, *notes))
+    measured = () if capacitance is None else inference.read_capacitances(capacitance)
+    return replace(
+        latest,
+        observations=(*latest.observations, *measured),
+        notes=(*latest.notes, *notes),
+    )
 
 
 def _forecast(

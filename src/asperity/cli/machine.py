@@ -58,6 +58,16 @@ SOLVED = (
     "crf_hz",
 )
 
+StiffnessOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--stiffness",
+        metavar="FILE.csv",
+        help="Write stiffness and damping at every point of [study] for rotor dynamics, instead of "
+        "solving the machine.",
+    ),
+]
+
 
 @app.command("machine")
 def machine_command(
@@ -72,15 +82,7 @@ def machine_command(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Print the contacts' conditions without solving.")
     ] = False,
-    stiffness: Annotated[
-        Path | None,
-        typer.Option(
-            "--stiffness",
-            metavar="FILE.csv",
-            help="Write stiffness and damping at every point of [study] for rotor dynamics, "
-            "instead of solving the machine.",
-        ),
-    ] = None,
+    stiffness: StiffnessOption = None,
     figures: Figures = None,
     opened: OpenPage = False,
     as_json: AsJson = False,
@@ -100,6 +102,25 @@ def machine_command(
             result = machines.solve_machine(chosen, out=out, workers=workers, progress=step)
         if out is not None:
             _save(result, out, quiet=quiet)
+    _show(result, page, (out, figures), as_json=as_json, quiet=quiet)
+    open_page(page, requested=opened)
+    if result.failures:
+        raise AsperityError(
+            f"{len(result.failures)} of {len(result.rows)} contacts were not solved; the first: "
+            f"{result.failures[0]['name']}: {result.failures[0]['reason']}"
+        )
+
+
+def _show(
+    result: "MachineResult",
+    page: Path | None,
+    outputs: tuple[Path | None, Path | None],
+    *,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Print verdict and tables, and write the figures."""
+    out, figures = outputs
     _draw(result, figures)
     show(
         result.verdict(),
@@ -111,12 +132,6 @@ def machine_command(
         as_json=as_json,
         quiet=quiet,
     )
-    open_page(page, requested=opened)
-    if result.failures:
-        raise AsperityError(
-            f"{len(result.failures)} of {len(result.rows)} contacts were not solved; the first: "
-            f"{result.failures[0]['name']}: {result.failures[0]['reason']}"
-        )
 
 
 def _tabulate(chosen: "MachineCase", path: Path, *, as_json: bool, quiet: bool) -> None:

@@ -24,7 +24,7 @@ def observe(
             "--structure",
             metavar="FILE|NAME",
             help="Structure without its contact: bodies, matrices, modes or measured receptances, "
-            "or a built-in one: fzg-gears, paper-rig, roller-bearing-rotor, twin-disc (default: "
+            "or a built-in one: fzg-gears, paper-rig, roller-bearing, twin-disc (default: "
             "the mass of [vibration] alone).",
         ),
     ] = None,

@@ -33,9 +33,9 @@ class StiffnessTable:
     """Stiffness and damping of a bearing, or of each contact of another machine.
 
     A bearing has a row for each point of [study]: the values of the study as written, the speed of
-    the shaft as `frequency` [rad/s], stiffness `kxx kxy kyx kyy` [N/m] and damping `cxx cxy cyx
-    cyy` [N s/m], x along the radial load. Another machine has a row for each contact too, with
-    `contact`, `load_n`, `kxx` and `cxx` along its normal.
+    the shaft as `frequency` [rad/s], stiffness kxx, kxy, kyx and kyy [N/m] and damping cxx to cyy
+    [N s/m], x along the radial load. Another machine has a row for each contact too, with
+    `contact`, `load_n`, kxx and cxx along its normal.
     """
 
     table: pandas.DataFrame

@@ -20,7 +20,7 @@ from asperity.monitoring.reading import WINDOW, Reading
 from asperity.monitoring.recording import TrackedRecording
 from asperity.monitoring.series_state import PreviousStates, SeriesMemory
 from asperity.monitoring.settings import TrackSettings
-from asperity.monitoring.states import contact_evidence, unresponsive_mode
+from asperity.monitoring.states import contact_evidence
 from asperity.monitoring.target import Target
 from asperity.monitoring.track_result import Track
 from asperity.recording import ACCELERATION
@@ -40,7 +40,6 @@ from asperity.trend import (
     StageErrors,
     Stages,
     StageSource,
-    asperity_load_share,
     comparability,
     split_stages,
 )
@@ -85,6 +84,8 @@ def judge(
         series = _single_sensor(readings, target, settings, places, x_name, memory)
     if target.assumed:
         series.notes.insert(0, f"The band is {target.source}.")
+    if target.unresponsive:
+        series.notes.insert(0, target.unresponsive)
     return _staged(series, target, settings, previous)
 
 
@@ -219,9 +220,7 @@ def _staged(
         response=response,
         of_contact=bool(evidence),
     )
-    tracked = _with_states(tracked, stages, source, response, alarm)
-    if target.full_load_crf_hz is not None and not unresponsive_mode(target):
-        tracked = _with_load_share(tracked, target)
+    tracked = _with_load_share(_with_states(tracked, stages, source, response, alarm), target)
     return Track(
         recordings=tuple(tracked),
         x_name=x_name,
@@ -233,12 +232,7 @@ def _staged(
         evidence=evidence,
         comparable=units == {ACCELERATION},
         problems=comparability([_facts_of(recording) for recording in series.used]),
-        notes=(
-            *filter(None, [unresponsive_mode(target)]),
-            *notes,
-            *_notes(tracked, units, response),
-            *remounted,
-        ),
+        notes=(*notes, *_notes(tracked, units, response), *remounted),
     )
 
 
@@ -291,21 +285,14 @@ def _incomparable_units(units: set[str]) -> list[str]:
     ]
 
 
-def _with_load_share(tracked: Sequence[TrackedRecording], target: Target) -> list[TrackedRecording]:
-    """Add the asperities' load share and its 90 % interval, as the contact model reads CRF."""
+def _with_load_share(tracked: list[TrackedRecording], target: Target) -> list[TrackedRecording]:
+    """Add the asperities' load share and its 90 % interval, if the contact model reads CRF."""
     crf, crf_std = np.array(
         [(recording.resonance.crf_hz, recording.resonance.crf_std) for recording in tracked]
     ).T
-    crf_std, full_load_crf_hz = (
-        np.where(np.isfinite(crf_std), crf_std, 0.0),
-        target.full_load_crf_hz,
-    )
-    assert full_load_crf_hz is not None
-    if target.structural is not None:
-        crf_std = crf_std * target.structural.single_mass_slope(crf)
-        crf = target.structural.on_single_mass(crf)
-        full_load_crf_hz = target.structural.springs[1].natural_frequency_hz
-    share = asperity_load_share(crf, crf_std, full_load_crf_hz)
+    share = target.load_share(crf, np.where(np.isfinite(crf_std), crf_std, 0.0))
+    if share is None:
+        return tracked
     return [
         replace(recording, clr=float(clr), clr_interval=(float(low), float(high)))
         for recording, clr, low, high in zip(tracked, share.clr, *share.interval, strict=True)

@@ -19,7 +19,6 @@ from asperity.monitoring.forecast import FORECAST
 from asperity.monitoring.operating_point import CRF, USUAL_OIL, conditions_of
 from asperity.monitoring.recording import TrackedRecording
 from asperity.monitoring.target import Target
-from asperity.structure import MIN_CONTACT_SHARE
 from asperity.trend import ALERT_FACTOR, Alarm
 
 UNSEEN = 3  # last recordings without a resonance from which the contact is not seen
@@ -172,7 +171,7 @@ def sensor_state(
 
 def contact_evidence(tracked: Sequence[TrackedRecording], target: Target) -> str:
     """Return in words why the line of a series belongs to the contact; "" if nothing shows it."""
-    if unresponsive_mode(target):
+    if target.unresponsive:
         return ""
     if target.case is not None:
         return f"the contact of {target.case.source} predicts its band"
@@ -185,21 +184,6 @@ def contact_evidence(tracked: Sequence[TrackedRecording], target: Target) -> str
     if found and 2 * len(agreed) > len(found):
         return "two sensors agree on it"
     return _followed_condition(found)
-
-
-def unresponsive_mode(target: Target) -> str:
-    """Return why the mode says too little about the contact for a wear stage; "" otherwise."""
-    if target.structural is None:
-        return ""
-    share = target.structural.contact_share
-    if share >= MIN_CONTACT_SHARE:
-        return ""
-    return (
-        f"No wear stage is determined: the contact has {100.0 * share:.2g} % of the strain energy "
-        f"of the mode at {target.structural.full_load_hz:.0f} Hz, less than "
-        f"{100.0 * MIN_CONTACT_SHARE:.0f} %, so that its frequency says little about the contact; "
-        "use a sensor and band where it has more (`asperity observe`)."
-    )
 
 
 def _followed_condition(found: Sequence[TrackedRecording]) -> str:

@@ -4,9 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from asperity.case import Case, MachineCase
+from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, require_positive
 from asperity.coupling import BAND_MARGIN, StructuralResonance, search_band, structural_resonance
 from asperity.paper import papers_case
+from asperity.structure import MIN_CONTACT_SHARE
+from asperity.trend import LoadShare, asperity_load_share
 
 SHAFTS = ("shaft_hz", "pinion_hz", "cam_hz", "disc_1_hz")  # shafts with a speed in the case
 USUAL_DAMPING = 0.02  # damping ratio of the paper, without a case
@@ -34,6 +37,31 @@ class Target:
     rates_per_turn: Mapping[str, float] = field(default_factory=dict)
     shaft_hz: float | None = None
 
+    @property
+    def unresponsive(self) -> str:
+        """Reason why the mode says too little about the contact for a wear stage; else ""."""
+        mode = self.structural
+        if mode is None or mode.contact_share >= MIN_CONTACT_SHARE:
+            return ""
+        return (
+            f"No wear stage is determined: the contact has {100.0 * mode.contact_share:.2g} % of "
+            f"the strain energy of the mode at {mode.full_load_hz:.0f} Hz, less than "
+            f"{100.0 * MIN_CONTACT_SHARE:.0f} %, so that its frequency says little about the "
+            "contact; use a sensor and band where it has more (`asperity observe`)."
+        )
+
+    def load_share(self, crf_hz: Field, crf_std_hz: Field) -> LoadShare | None:
+        """Return the load share of the asperities by CRF; None without a responsive model."""
+        if self.full_load_crf_hz is None or self.unresponsive:
+            return None
+        if self.structural is None:
+            return asperity_load_share(crf_hz, crf_std_hz, self.full_load_crf_hz)
+        return asperity_load_share(
+            self.structural.on_single_mass(crf_hz),
+            crf_std_hz * self.structural.single_mass_slope(crf_hz),
+            self.structural.springs[1].natural_frequency_hz,
+        )
+
 
 def search_target(
     case: Case | MachineCase | None = None, band_hz: tuple[float, float] | None = None
@@ -52,52 +80,50 @@ def search_target(
         return replace(
             search_target(_contact(case), band_hz), rates_per_turn=per_turn, shaft_hz=shaft
         )
-    if band_hz is not None:
+    if band_hz is not None and case is None:
         low, high = _valid_band(band_hz)
-        source = f"{low:.0f} to {high:.0f} Hz, as given"
-        if case is None:
-            return Target(
-                band_hz=(low, high),
-                width_hz=2.0 * USUAL_DAMPING * low,
-                full_load_crf_hz=None,
-                source=source,
-            )
+        return Target(
+            band_hz=(low, high),
+            width_hz=2.0 * USUAL_DAMPING * low,
+            full_load_crf_hz=None,
+            source=_source((low, high), None, given=True),
+        )
     contact = case or papers_case()
-    if contact.vibration is None:
+    model = contact.vibration
+    if model is None:
         raise BadInput(
             f"{contact.source}: [vibration] is missing; add it with mass and damping_ratio, "
             "or give a band"
         )
-    model, structure = contact.vibration, contact.structure
     structural = None
-    damping_ratio = model.damping_ratio
-    if structure is None:
-        searched = search_band(contact.conditions, model)
-    else:
-        structural = structural_resonance(structure.structure, contact.conditions, model)
-        searched, damping_ratio = structural.band_hz, structural.damping_ratio
-    full_load = None if case is None else searched[1] / (1.0 + BAND_MARGIN)
-    if band_hz is not None:
-        searched = (low, high)
-    elif case is not None:
-        inside = "" if structure is None else f" in {structure.name}"
-        source = (
-            f"{searched[0]:.0f} to {searched[1]:.0f} Hz, from the contact of {case.source}{inside}"
-        )
-    else:
-        source = (
-            f"{searched[0]:.0f} to {searched[1]:.0f} Hz, that of the paper's contact, because "
-            "neither a case nor a band was given; give `case` or `band_hz`"
-        )
+    if contact.structure is not None:
+        structural = structural_resonance(contact.structure.structure, contact.conditions, model)
+    possible = search_band(contact.conditions, model) if structural is None else structural.band_hz
+    searched = possible if band_hz is None else _valid_band(band_hz)
+    damping_ratio = model.damping_ratio if structural is None else structural.damping_ratio
     return Target(
         band_hz=searched,
         width_hz=2.0 * damping_ratio * searched[0],
-        full_load_crf_hz=full_load,
-        source=source,
+        full_load_crf_hz=None if case is None else possible[1] / (1.0 + BAND_MARGIN),
+        source=_source(searched, case, given=band_hz is not None),
+        structural=structural,
         assumed=case is None and band_hz is None,
         case=case,
-        structural=structural,
     )
+
+
+def _source(band_hz: tuple[float, float], case: Case | None, *, given: bool) -> str:
+    """Return the origin of a band."""
+    span = f"{band_hz[0]:.0f} to {band_hz[1]:.0f} Hz"
+    if given:
+        return f"{span}, as given"
+    if case is None:
+        return (
+            f"{span}, that of the paper's contact, because neither a case nor a band was given; "
+            "give `case` or `band_hz`"
+        )
+    inside = "" if case.structure is None else f" in {case.structure.name}"
+    return f"{span}, from the contact of {case.source}{inside}"
 
 
 def _valid_band(band_hz: tuple[float, float]) -> tuple[float, float]:

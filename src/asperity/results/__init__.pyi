@@ -1,5 +1,5 @@
 from .contact_course import ContactCourse as ContactCourse
-from .contact_course import ContactSpring as ContactSpring
+from .contact_course import DynamicSpring as DynamicSpring
 from .contact_course import contact_spring as contact_spring
 from .contact_course import solve_course as solve_course
 from .curves import FrictionCurve as FrictionCurve

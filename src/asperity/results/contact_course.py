@@ -20,7 +20,7 @@ FREQUENCIES = 6  # at which the contact's stiffness and damping are computed
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class ContactSpring:
+class DynamicSpring:
     """Dynamic stiffness and damping of a contact over frequency [N/m, N s/m], shape (n,) each."""
 
     frequencies_hz: Field
@@ -55,7 +55,7 @@ class ContactCourse:
         return tuple(run.state.clr for run in self.runs)
 
     @cached_property
-    def springs(self) -> tuple[ContactSpring, ...]:
+    def springs(self) -> tuple[DynamicSpring, ...]:
         """Dynamic stiffness and damping of each run.
 
         Raises
@@ -66,12 +66,12 @@ class ContactCourse:
         return tuple(map(contact_spring, self.runs))
 
 
-def contact_spring(run: Run) -> ContactSpring:
+def contact_spring(run: Run) -> DynamicSpring:
     """Compute the dynamic stiffness and damping of a solved contact from 50 Hz to 20 kHz."""
     contact = OscillatingContact(run.solution)
     frequencies_hz = np.geomspace(*BAND_HZ, FREQUENCIES)
     values = [contact.evaluate(float(frequency_hz)) for frequency_hz in frequencies_hz]
-    return ContactSpring(
+    return DynamicSpring(
         frequencies_hz,
         np.array([value.stiffness for value in values]),
         np.array([value.damping for value in values]),

@@ -57,7 +57,7 @@ def machine_structures() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in MACHINES.glob("*.toml")))
 
 
-def load_structure(path: str | Path) -> NamedStructure:
+def load_structure(path: str | Path, *, folder: Path | None = None) -> NamedStructure:
     """Load a structure in SI units from a file, or a built-in one by its name.
 
     A file has one of
@@ -77,6 +77,11 @@ def load_structure(path: str | Path) -> NamedStructure:
     one axis. Missing responses from body 1 or the sensor to body 2 count as 0, as of separate
     bodies. The power spectrum of the sensor (type 9) is the noise.
 
+    Parameters
+    ----------
+    path : of the file, or the name of a built-in structure
+    folder : base of a relative path; None: the current one
+
     Raises
     ------
     UnreadableFile
@@ -92,7 +97,7 @@ def load_structure(path: str | Path) -> NamedStructure:
             f"structure {str(path)!r} is not built in; use {', '.join(machine_structures())}, or "
             "name a file"
         )
-    path = Path(path)
+    path = Path(path) if folder is None else folder / path
     require_file(path)
     if path.stat().st_size > MAX_BYTES:
         raise UnreadableFile(

@@ -32,7 +32,7 @@ class ContactMode:
     contact_shape: Field
 
     @cached_property
-    def _log_frequency(self) -> scipy.interpolate.PchipInterpolator:
+    def _log_frequency(self) -> "scipy.interpolate.PchipInterpolator":
         return scipy.interpolate.PchipInterpolator(
             np.log(self.stiffness), np.log(self.frequency_hz), extrapolate=True
         )
