@@ -33,7 +33,7 @@ def test_a_mode_of_the_holder_moves_with_the_contact(asp):
     low, high = result["modes"]
     assert set(low) == {
         *("frequency_hz", "damping_ratio", "contact_share", "contact_stiffness_n_m"),
-        *("frequencies_hz", "movement", "shift_per_clr", "amplitude_at_sensor"),
+        *("frequencies_hz", "damping_ratios", "movement", "shift_per_clr", "amplitude_at_sensor"),
     }
     assert low["contact_share"] < 0.02
     assert high["contact_share"] > 0.9

@@ -33,7 +33,8 @@ MAX_MODES = 12
 class ObservedMode:
     """Mode of the structure with its contact, over the course of wear.
 
-    `mode` is that with the case's own roughness, `frequencies_hz` those over the course.
+    `mode` is that with the case's own roughness, `frequencies_hz` and `damping_ratios` those over
+    the course.
     `shift_per_clr` is the relative change of the frequency per unit of load share; None where the
     load share does not change. `amplitude_at_sensor` is the density of the acceleration at the
     frequency of the mode [m/s²/√Hz], None without an excitation.
@@ -41,6 +42,7 @@ class ObservedMode:
 
     mode: CoupledMode
     frequencies_hz: tuple[float, ...]
+    damping_ratios: tuple[float, ...]
     shift_per_clr: float | None
     amplitude_at_sensor: float | None
 
@@ -57,6 +59,7 @@ class ObservedMode:
             "contact_share": self.mode.contact_share,
             "contact_stiffness_n_m": self.mode.stiffness,
             "frequencies_hz": list(self.frequencies_hz),
+            "damping_ratios": list(self.damping_ratios),
             "movement": self.movement,
             "shift_per_clr": self.shift_per_clr,
             "amplitude_at_sensor": self.amplitude_at_sensor,
@@ -213,29 +216,33 @@ def _observed(
         for spring in course.springs
     ]
     observed = []
-    for number, mode in enumerate(modes[course.own]):
+    for mode in modes[course.own]:
         if not BAND_HZ[0] <= mode.frequency_hz <= BAND_HZ[1]:
             continue
-        over_course = tuple(
-            at_roughness[number].frequency_hz
-            if len(at_roughness) == len(modes[course.own])
-            # of receptances, a mode may leave the measured frequencies
-            else min(
-                (other.frequency_hz for other in at_roughness),
-                key=lambda frequency_hz: abs(frequency_hz - mode.frequency_hz),
-                default=mode.frequency_hz,
-            )
-            for at_roughness in modes
-        )
+        over_course = [_same_mode(at_roughness, modes[course.own], mode) for at_roughness in modes]
+        frequencies_hz = tuple(entry.frequency_hz for entry in over_course)
         observed.append(
             ObservedMode(
                 mode=mode,
-                frequencies_hz=over_course,
-                shift_per_clr=_slope(course.clr, over_course),
+                frequencies_hz=frequencies_hz,
+                damping_ratios=tuple(entry.damping_ratio for entry in over_course),
+                shift_per_clr=_slope(course.clr, frequencies_hz),
                 amplitude_at_sensor=_amplitude(structure, course.runs[course.own], mode),
             )
         )
     return tuple(observed[:MAX_MODES])
+
+
+def _same_mode(
+    modes: Sequence[CoupledMode], own: Sequence[CoupledMode], mode: CoupledMode
+) -> CoupledMode:
+    """Return a mode at another roughness: the same number, or the nearest.
+
+    A mode of receptances may leave the measured frequencies.
+    """
+    if len(modes) == len(own):
+        return modes[own.index(mode)]
+    return min(modes, key=lambda other: abs(other.frequency_hz - mode.frequency_hz), default=mode)
 
 
 def _single_mass(case: Case) -> NamedStructure:
