@@ -49,7 +49,7 @@ ALONE = (
 # parts without timings: one entry per processor; an entry is a part, or parts that depend on
 # each other
 ABREAST = (
-    ("inference", "forecast", "next_points", "rings"),  # the longest first
+    ("inference", "forecast", "next_points", "rings", "evidence"),  # the longest first
     ("wearing",),
     ("indicators",),
     ("no_speed", "chosen_grids"),
