@@ -40,6 +40,7 @@ FILM_RATIOS = 1.0, 3.0
 MIN_SHARE = 0.01  # of the load, below which there is no resonance
 CRF_STD, DAMPING_STD = 0.005, 0.1
 CAPACITANCE_STD, PERMITTIVITY_STD = 0.02, 0.05
+ROUNDING = 1e-3  # of a load share that counts as inside
 PLACES = ((500.0, 1.91), (300.0, 0.8), (900.0, 0.8), (300.0, 2.5), (900.0, 2.5))
 
 
@@ -194,25 +195,24 @@ def tables(table: pandas.DataFrame) -> Iterator[str]:
         "capacitance | ratio (median) | coverage without, with |"
     )
     yield "|---|---|---|---|---|---|"
-    for low, high in ((1.0, 1.5), (1.5, 2.0), (2.0, 3.0), FILM_RATIOS):
-        part = table[(table["film_ratio"] >= low) & (table["film_ratio"] < high)]
-        if not len(part):
-            continue
-        widths = {
-            name: part[f"clr_{name}_high"] - part[f"clr_{name}_low"] for name in ("without", "with")
-        }
-        covered = {
-            name: (
-                (part["clr"] >= part[f"clr_{name}_low"] - 1e-3)
-                & (part["clr"] <= part[f"clr_{name}_high"] + 1e-3)
-            ).mean()
-            for name in widths
-        }
+    groups = {
+        f"{low:g} to {high:g}": table["film_ratio"].between(low, high)
+        for low, high in ((1.0, 1.5), (1.5, 2.0), (2.0, 3.0), FILM_RATIOS)
+    }
+    groups["fewer than three resonances"] = table["resonances"] < 3
+    for name, chosen in groups.items():
+        part = table[chosen]
+        widths, covered = {}, {}
+        for kind in ("without", "with"):
+            low, high = part[f"clr_{kind}_low"], part[f"clr_{kind}_high"]
+            widths[kind] = high - low
+            inside = (part["clr"] >= low - ROUNDING) & (part["clr"] <= high + ROUNDING)
+            covered[kind] = 100.0 * inside.mean()
         yield (
-            f"| {low:g} to {high:g} | {len(part)} | {part['resonances'].mean():.1f} | "
+            f"| {name} | {len(part)} | {part['resonances'].mean():.1f} | "
             f"{100 * widths['without'].median():.1f}, {100 * widths['with'].median():.1f} points | "
             f"{(widths['with'] / widths['without']).median():.2f} | "
-            f"{100 * covered['without']:.0f}, {100 * covered['with']:.0f} % |"
+            f"{covered['without']:.0f}, {covered['with']:.0f} % |"
         )
 
 
