@@ -21,6 +21,7 @@ from .roller_shape import ShapeSection as ShapeSection
 from .sections import CaseFile as CaseFile
 from .sections import ContactSection as ContactSection
 from .sections import GridSection as GridSection
+from .sections import InletSection as InletSection
 from .sections import MotionSection as MotionSection
 from .sections import SolverSection as SolverSection
 from .sensing import SensingSection as SensingSection

@@ -190,12 +190,7 @@ class Case(Brief):
     @cached_property
     def options(self) -> Options:
         """Solver options."""
-        solver = {
-            name: plain(value)
-            for name, value in self.contents.solver
-            if name not in ("surfaces", "dynamic", "running_cells")
-        }
-        return Options(model=self.contents.model, **solver)
+        return self.contents.options()
 
     @cached_property
     def vibration(self) -> VibrationModel | None:
@@ -372,7 +367,7 @@ class Case(Brief):
         of_oil = () if self._sheet is None else self._sheet.notes()
         return (
             *of_oil,
-            *plausibility_notes(conditions, oil),
+            *plausibility_notes(conditions, oil, self.options.inlet_layer),
             *inlet_notes(conditions, oil, self.grid, rough=self.surface().sq > 0.0),
         )
 

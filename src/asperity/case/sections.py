@@ -24,12 +24,13 @@ from asperity.case.units import (
     SpeedOrRest,
     default_amount,
     parse_amount,
+    plain,
 )
 from asperity.case.vibration import parse_vibration
 from asperity.case.wear import WearSection
 from asperity.contact.conditions import Geometry
 from asperity.core.errors import BadInput
-from asperity.ehl import MAX_CELLS_PER_TIME_STEP, ContactModel, Options, Start
+from asperity.ehl import MAX_CELLS_PER_TIME_STEP, ContactModel, InletLayer, Options, Start
 
 MAX_FREQUENCIES = 200  # of the dynamic stiffness
 
@@ -127,6 +128,12 @@ class SolverSection(Section):
         return count
 
 
+class InletSection(Section):
+    """[inlet]: oil that enters the contact."""
+
+    layer: Length  # on both bodies together, ahead of the contact
+
+
 class MotionSection(Section):
     """[motion]: motion of the roughness in `asperity run`."""
 
@@ -149,6 +156,7 @@ class CaseFile(Section):
     lubricant: Annotated[LubricantSection | SheetSection | None, PlainValidator(parse_lubricant)]
     surface: Annotated[SurfaceSection, PlainValidator(parse_surface)]
     grid: GridSection = GridSection()
+    inlet: Annotated[InletSection | None, OPTIONAL] = None
     solver: SolverSection = SolverSection()
     thermal: ThermalSection = Field(default_factory=ThermalSection)
     sensing: Annotated[SensingSection | None, OPTIONAL] = None
@@ -158,6 +166,16 @@ class CaseFile(Section):
     motion: Annotated[MotionSection | None, OPTIONAL] = None
     wear: Annotated[WearSection | None, OPTIONAL] = None
     infer: Annotated[InferSection | None, PlainValidator(parse_infer)] = None
+
+    def options(self) -> Options:
+        """Return the solver options."""
+        solver = {
+            name: plain(value)
+            for name, value in self.solver
+            if name not in ("surfaces", "dynamic", "running_cells")
+        }
+        layer = None if self.inlet is None else InletLayer.uniform(plain(self.inlet.layer))
+        return Options(model=self.model, inlet_layer=layer, **solver)
 
     @model_validator(mode="before")
     @classmethod

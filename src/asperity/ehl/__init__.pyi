@@ -23,6 +23,7 @@ from .grid_design import flooded_inlet as flooded_inlet
 from .grid_design import grid_shortfalls as grid_shortfalls
 from .grid_design import inlet_length as inlet_length
 from .grid_design import missing_inlet as missing_inlet
+from .inlet_layer import InletLayer as InletLayer
 from .load_shares import hertz_zone as hertz_zone
 from .outcome import MAX_CELLS_PER_TIME_STEP as MAX_CELLS_PER_TIME_STEP
 from .outcome import ContactModel as ContactModel

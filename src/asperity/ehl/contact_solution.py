@@ -233,10 +233,13 @@ class ContactSolution(Displayed):
         conditions = asdict(self.conditions)
         if conditions["shape"] is None:
             del conditions["shape"]  # rollers only; unknown to readers older than rollers
+        options = asdict(self.options)
+        if options["inlet_layer"] is None:
+            del options["inlet_layer"]  # starved contacts only, likewise
         return {
             "conditions": conditions,
             "lubricant": None if self.lubricant is None else describe_lubricant(self.lubricant),
-            "options": asdict(self.options),
+            "options": options,
             "grid": asdict(self.grid),
             "convergence": {
                 "status": convergence.status.value,

@@ -8,6 +8,7 @@ from typing import Literal, get_args
 
 from asperity.core.displayed import Brief
 from asperity.core.errors import BadInput, require_positive
+from asperity.ehl.inlet_layer import InletLayer
 from asperity.ehl.uncertainty import ContactError
 
 ContactModel = Literal["unified", "paper", "mixed", "conserving"]
@@ -29,12 +30,14 @@ class Options:
         the load share by some per cent per factor of ten, so quote it with every CLR.
     model : "unified" (or "paper"): one pressure for oil and asperities; "mixed": two pressures, at
         zero speed the dry contact; "conserving": mixed, with mass-conserving cavitation
+    inlet_layer : oil that enters, for model "conserving"; None: the inlet is full of oil
     """
 
     tolerance: float = 1e-4
     max_iterations: int = 200
     contact_film: float = 5e-9
     model: ContactModel = "mixed"
+    inlet_layer: InletLayer | None = None
 
     def __post_init__(self) -> None:
         if not 0.0 < self.tolerance < 0.1:
@@ -46,6 +49,11 @@ class Options:
         require_positive("contact film", self.contact_film, "m")
         if self.model not in MODELS:
             raise BadInput(f"model must be one of {', '.join(MODELS)}, got {self.model!r}")
+        if self.inlet_layer is not None and self.model != CONSERVING:
+            raise BadInput(
+                f'an inlet layer needs the model "conserving", which balances the oil, got '
+                f'{self.model!r}; set model = "conserving"'
+            )
 
 
 # strategies in their order, until one converges

@@ -12,6 +12,7 @@ from asperity.ehl.deflection import MIRROR_BETWEEN, MIRROR_THROUGH
 from asperity.ehl.far_pressure import build_up_lengths, rigid_pressure
 from asperity.ehl.film_formulas import central_film, least_film, least_films
 from asperity.ehl.grid_design import MIN_CELLS_SHORT_AXIS, MIN_COARSE_CELLS, inlet_length
+from asperity.ehl.inlet_layer import InletLayer
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.outcome import ARITHMETIC, ATTEMPTS, CONSERVING, TWO_PRESSURES, Options
 from asperity.ehl.roller_profile import BodyShape, RollerProfile
@@ -56,7 +57,13 @@ def contact_problem(
         and attempt != ARITHMETIC
         and bool(np.any(surface.heights)),
         conserve=options.model == CONSERVING and lubricant is not None,
+        inlet_layer=_inlet_layer(options, scales),
     )
+
+
+def _inlet_layer(options: Options, scales: Scales) -> InletLayer | None:
+    layer = options.inlet_layer
+    return None if layer is None else layer.scaled(scales.length, scales.gap)
 
 
 def _body_shape(conditions: ContactConditions, scales: Scales) -> BodyShape:

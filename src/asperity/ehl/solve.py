@@ -3,6 +3,7 @@
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from asperity.ehl.scales import Scales
 from asperity.ehl.strategies.grid_continuation import Progress, Search
 from asperity.ehl.strategies.mixed_search import COARSE_TO_FINE, ROBUST, MixedSearch
 from asperity.ehl.strategies.oil_state import pressures_of
+from asperity.ehl.strategies.starved_inlet import FRONTS, emptied_inlet
 from asperity.lubricant import Lubricant, require_liquid
 from asperity.surface import Surface
 
@@ -76,6 +78,8 @@ def solve_contact(
     if viscosity_factor is not None:
         _check_factor(viscosity_factor, surface)
     solve = SOLVERS[options.model if lubricant else PAPER]  # one pressure without oil
+    if options.inlet_layer is not None and lubricant is not None:
+        solve = solve_starved
     solution = solve(
         conditions,
         lubricant,
@@ -169,6 +173,44 @@ def solve_mixed(
         start=start,
     )
     return replace(solution, viscosity_factor=viscosity_factor)
+
+
+def solve_starved(
+    conditions: ContactConditions,
+    lubricant: Lubricant | None,
+    surface: Surface,
+    *,
+    options: Options,
+    start: ContactSolution | None = None,
+    viscosity_factor: Field | None = None,
+    progress: Progress | None = None,
+) -> ContactSolution:
+    """Solve a conserving contact with an inlet layer; called by `solve_contact`.
+
+    The guesses are the neighbouring solution, if there is one, and then the flooded contact with
+    its inlet emptied up to several fronts.
+    """
+    began = time.perf_counter()
+    assert options.inlet_layer is not None
+    solve = partial(
+        solve_mixed,
+        conditions,
+        lubricant,
+        surface,
+        viscosity_factor=viscosity_factor,
+        progress=progress,
+    )
+    solution = None if start is None else solve(options=options, start=start)
+    if solution is None or not solution.convergence.converged:
+        flooded = solve(options=replace(options, inlet_layer=None))
+        for front in FRONTS:
+            guess = emptied_inlet(flooded, options.inlet_layer, front)
+            solution = solve(options=options, start=guess)
+            if solution.convergence.converged:
+                break
+    assert solution is not None
+    taken = replace(solution.convergence, seconds=time.perf_counter() - began)
+    return replace(solution, convergence=taken)
 
 
 def _solve_cold(

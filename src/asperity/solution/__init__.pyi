@@ -1,3 +1,7 @@
+from .depletion import Pass as Pass
+from .depletion import Reflow as Reflow
+from .depletion import deplete_track as deplete_track
+from .depletion import levelled as levelled
 from .dynamic import DynamicStiffness as DynamicStiffness
 from .dynamic import OscillatingContact as OscillatingContact
 from .dynamic import OwnResonance as OwnResonance
@@ -8,6 +12,8 @@ from .ends import EndValue as EndValue
 from .ends import axial_distribution as axial_distribution
 from .flash import FlashTemperature as FlashTemperature
 from .flash import flash_temperature as flash_temperature
+from .flow import OilFlow as OilFlow
+from .flow import oil_flow as oil_flow
 from .inlet import InletHeating as InletHeating
 from .inlet import heats_inlet as heats_inlet
 from .inlet import inlet_heating as inlet_heating

@@ -9,6 +9,7 @@ from asperity.contact.grid import Grid
 from asperity.core.quantities import quantity
 from asperity.ehl import (
     ContactSolution,
+    InletLayer,
     Uncertainty,
     build_up_lengths,
     film_loss,
@@ -20,6 +21,7 @@ from asperity.ehl import (
     loss_beyond_body,
     missing_inlet,
 )
+from asperity.ehl.film_formulas import central_film
 from asperity.ehl.grid_design import CELLS_IN_INLET, MAX_CLR_ERROR, MAX_FILM_ERROR
 from asperity.ehl.load_shares import carried_share
 from asperity.ehl.outcome import ARITHMETIC
@@ -38,18 +40,38 @@ FARTHER = "farther out"
 MIN_STARVATION = 0.03  # relative loss of film that is noted
 # Ridges count as edges if cells twice as wide increase their radius by this factor.
 EDGE_RATIO, MIN_RIDGES = 1.6, 20
+NEARLY_FLOODED = 5.0  # inlet layer over flooded film, from which a ball keeps 98 % of its film
 THIN_FILM_RATIO = 0.5  # film ratio below which no full film is expected
 NO_LOAD_SHARE = 0.01  # asperity load share that counts as none
 FILM_LOSS_PER_PRESSURE_LOSS = 0.75  # relative, for inlet pressure lost by a short inlet
 
 
 def plausibility_notes(
-    conditions: ContactConditions, lubricant: Lubricant | None
+    conditions: ContactConditions,
+    lubricant: Lubricant | None,
+    inlet_layer: InletLayer | None = None,
 ) -> tuple[str, ...]:
-    """Return notes on doubtful input: bodies, load and oil."""
+    """Return notes on doubtful input: bodies, load and oil, and on a starved inlet."""
     solids = _solids(conditions)
     oil = () if lubricant is None else _oil(conditions, lubricant)
-    return (*solids, *(_roller(conditions) if conditions.geometry == "roller" else ()), *oil)
+    roller = _roller(conditions) if conditions.geometry == "roller" else ()
+    if lubricant is None or inlet_layer is None:
+        return (*solids, *roller, *oil)
+    return (*solids, *roller, *oil, _layer_note(conditions, lubricant, inlet_layer))
+
+
+def _layer_note(
+    conditions: ContactConditions, lubricant: Lubricant, inlet_layer: InletLayer
+) -> str:
+    """Return how much of the flooded film's oil the inlet layer has."""
+    flooded, layer = central_film(conditions, lubricant), max(inlet_layer.thickness)
+    ratio = layer / flooded
+    state = "nearly flooded" if ratio > NEARLY_FLOODED else "starved"
+    film = quantity("h_central_m")
+    return (
+        f"The inlet layer of {film.text(layer)} is {ratio:.2g} times the oil of the flooded film, "
+        f"{film.text(flooded)} by a fit for smooth bodies: the contact is {state}."
+    )
 
 
 def inlet_notes(

@@ -15,6 +15,7 @@ from asperity.ehl import (
     Convergence,
     Figures,
     GridError,
+    InletLayer,
     Iteration,
     Oil,
     Options,
@@ -56,6 +57,7 @@ def load_solution(path: str | Path) -> ContactSolution:
 def _solution(dataset: "xarray.Dataset") -> ContactSolution:
     described = {name: json.loads(dataset.attrs[name]) for name in DESCRIBED}
     lubricant = described["lubricant"]
+    layer = described["options"].pop("inlet_layer", None)
     grid = described["grid"]
     pressure, gap, heights = (
         dataset[name].values for name in ("pressure", "gap", "surface_height")
@@ -64,7 +66,10 @@ def _solution(dataset: "xarray.Dataset") -> ContactSolution:
         conditions=_conditions(described["conditions"]),
         lubricant=None if lubricant is None else make_lubricant(lubricant),
         surface=Surface(heights, Grid(**{name: tuple(value) for name, value in grid.items()})),
-        options=Options(**described["options"]),
+        options=Options(
+            **described["options"],
+            inlet_layer=layer and InletLayer(tuple(layer["thickness"]), tuple(layer["y"])),
+        ),
         pressure=pressure,
         gap=gap,
         in_contact=dataset["in_contact"].values.astype(bool),

@@ -15,6 +15,7 @@ import numpy as np
 from asperity.core.arrays import Codes, Field, Mask
 from asperity.ehl.deflection import MIRROR_THROUGH, Deflection, deflection
 from asperity.ehl.grid_transfer import AnyField, average, interpolate, mirror_field
+from asperity.ehl.inlet_layer import InletLayer
 from asperity.ehl.load_shares import within_ellipse
 from asperity.ehl.models.transient_term import TransientTerm
 from asperity.ehl.roller_profile import BodyShape
@@ -50,10 +51,10 @@ class Problem:
     (nx, ny), None for 1. An aperiodic contact is bounded by lines of cells at ambient pressure, a
     roller by everything outside it. `accurate` selects the third-order wedge and logarithmic mean
     mobilities, `exact` mobilities that are exact for a linear gap, which need a least mobility;
-    `conserve` mass-conserving cavitation. `past` is the time derivative, None if steady. `fixed`
-    marks cells, (nx, ny), of given pressure, at a fixed approach. If `mirror` is not 0, cells end
-    at the plane Y = 0, MIRROR_BETWEEN two lines of cells or MIRROR_THROUGH the last one, and the
-    rest is their image.
+    `conserve` mass-conserving cavitation, of oil that enters as `inlet_layer`. `past` is the time
+    derivative, None if steady. `fixed` marks cells, (nx, ny), of given pressure, at a fixed
+    approach. If `mirror` is not 0, cells end at the plane Y = 0, MIRROR_BETWEEN two lines of cells
+    or MIRROR_THROUGH the last one, and the rest is their image.
     """
 
     form: BodyShape
@@ -71,6 +72,7 @@ class Problem:
     accurate: bool = False
     exact: bool = False
     conserve: bool = False
+    inlet_layer: InletLayer | None = None
     past: TransientTerm | None = None
     fixed: Mask | None = None
     mirror: int = 0
@@ -183,21 +185,27 @@ class Problem:
     @property
     def uniform(self) -> bool:
         """True if nothing varies along y, so that one line of cells suffices."""
-        fields = (
-            [self.roughness]
-            if self.viscosity_factor is None
-            else [self.roughness, self.viscosity_factor]
-        )
+        fields = self._varying_fields()
         return self.form.periodic and all(bool(np.all(field == field[:, :1])) for field in fields)
+
+    def _varying_fields(self) -> list[Field]:
+        """Return what may vary along y, each of shape (_, ny)."""
+        fields = [self.roughness]
+        if self.viscosity_factor is not None:
+            fields.append(self.viscosity_factor)
+        if self.inlet_layer is not None:
+            fields.append(self.inlet_layer.thickness_at(self.y)[None, :])
+        return fields
 
     @property
     def symmetric(self) -> bool:
         """True if the problem is symmetric about Y = 0: only half of it is then solved."""
         if self.form.periodic or self.form.roller is not None or np.any(self.roughness):
             return False
-        (_, ny), dy, factor = self.cells, self.spacing[1], self.viscosity_factor
-        even = factor is None or bool(
-            np.allclose(factor, factor[:, ::-1], rtol=SYMMETRY_TOLERANCE, atol=0.0)
+        (_, ny), dy = self.cells, self.spacing[1]
+        even = all(
+            np.allclose(field, field[:, ::-1], rtol=SYMMETRY_TOLERANCE, atol=0.0)
+            for field in self._varying_fields()
         )
         return even and abs(2.0 * self.lower[1] + ny * dy) < SYMMETRY_TOLERANCE * dy
 
@@ -330,7 +338,10 @@ class Problem:
         """
         x = self.x[:cells, None]
         before = x - cells * self.spacing[0]
-        return np.asarray(np.maximum(gap[:cells] + (before**2 - x**2) / 2.0, self.contact_gap))
+        filled = np.maximum(gap[:cells] + (before**2 - x**2) / 2.0, self.contact_gap)
+        if self.inlet_layer is None or not self.conserve:
+            return np.asarray(filled)
+        return np.asarray(np.minimum(filled, self.inlet_layer.thickness_at(self.y)))
 
     def _outflow(
         self, pressure: Field, film: Film, faces: Faces, gap: Field
