@@ -62,7 +62,9 @@ def test_a_smooth_ball_bearing_is_as_stiff_as_dry_hertz_contacts(tmp_path):
 
 def test_an_axially_loaded_bearing_is_equally_stiff_in_all_directions(tmp_path):
     thrust = {"machine.radial_load": "0 N", "machine.axial_load": "2 kN"}
-    case = machine(tmp_path, BALLS, **thrust, **{"machine.clearance": "20 um"})
+    case = machine(
+        tmp_path, BALLS, **thrust, **{"machine.clearance": "20 um", "machine.tilt": "0 rad"}
+    )
     (row,) = stiffness_table(case).table.to_dict("records")
     assert row["kxx"] == pytest.approx(row["kyy"], rel=1e-6)
     assert row["cxx"] == pytest.approx(row["cyy"], rel=1e-6)
@@ -78,6 +80,29 @@ def test_an_axially_loaded_bearing_is_equally_stiff_in_all_directions(tmp_path):
     spring = 4.5 * np.cos(angle) ** 2 / (1.0 / both[0] + 1.0 / both[1])
     assert row["kxx"] == pytest.approx(spring.real, rel=1e-6)
     assert row["cxx"] == pytest.approx(spring.imag / (100.0 * np.pi), rel=1e-6)
+
+
+def test_an_angular_contact_bearing_is_softer_when_its_ring_may_move_along_the_axis(tmp_path):
+    """K_rr - K_ra²/K_aa of the static matrix; forces that turn with the contact add some."""
+    thrust = {
+        "machine.radial_load": "1 kN",
+        "machine.axial_load": "2 kN",
+        "machine.contact_angle": "40 deg",
+    }
+    case = machine(tmp_path, BALLS, **thrust)
+    (row,) = stiffness_table(case).table.to_dict("records")
+    static = case.machine.stiffness_matrix(case.pair)
+    condensed = static[0, 0] - static[0, 1] ** 2 / static[1, 1]
+    assert row["kxx"] == pytest.approx(condensed, rel=0.05)
+    assert row["kxx"] < 0.97 * static[0, 0]
+
+
+def test_a_profiled_roller_carries_on_part_of_its_length(tmp_path):
+    straight, profiled = (
+        stiffness_table(machine(tmp_path, ROLLERS, **extra)).table["kxx"][0]
+        for extra in ({}, {"machine.profile": "iso"})
+    )
+    assert profiled < straight
 
 
 def test_another_machine_has_a_row_for_each_contact(tmp_path):

@@ -15,7 +15,15 @@ from asperity.inference import Observation, ObservedSeries, infer_series
 from asperity.inference.structure_input import on_single_mass
 from asperity.monitoring import TrackSettings, read_table, track_recordings
 from asperity.paper import Disturbance, RigSettings, papers_contact, simulate_rig, write_rig
-from asperity.structure import Receptances, Structure, contact_mode, coupled_modes, sensor_response
+from asperity.structure import (
+    NamedStructure,
+    Receptances,
+    Structure,
+    contact_mode,
+    coupled_modes,
+    load_structure,
+    sensor_response,
+)
 from support.emulated import formula_emulator, formula_setting
 
 CONTACT = """
@@ -48,18 +56,19 @@ y = [-1.6, 1.6]
 [vibration]
 mass = "0.1 kg"
 damping_ratio = 0.02
+stiffness_law = "hertz-line"
 """
-# on a stiff support, so that the contact has 3 % of the strain energy
+# on a stiff support, so that the contact has 2 % of the strain energy
 STIFF = """
 name = "a stiff arm"
-mass = [[2.0]]
-stiffness = [[2e9]]
-damping = [[900.0]]
+mass = [[20.0]]
+stiffness = [[2e10]]
+damping = [[9000.0]]
 contact = [1.0]
 sensor = [1.0]
 """
 
-HOLDER = STIFF.replace("2e9", "2e7").replace("900.0", "60.0")
+HOLDER = STIFF.replace("20.0", "2.0").replace("2e10", "2e8").replace("9000.0", "200.0")
 
 
 def test_a_mass_on_a_support_and_the_contact():
@@ -114,19 +123,44 @@ def test_the_mode_with_the_largest_share_is_followed():
     mode = contact_mode(structure, 1e8, 3e8)
     upper = [coupled_modes(structure, k)[1].frequency_hz for k in (1e8, 3e8)]
     assert mode.frequency_hz[[0, -1]] == pytest.approx(upper, rel=1e-9)
-    with pytest.raises(BadInput, match="no mode from 50 to 20000 Hz with a contact of 1 N/um"):
+    with pytest.raises(BadInput, match="no mode from 50 to 20000 Hz that can be followed"):
         contact_mode(Structure.single_mass(1e6), 1e5, 1e6)
 
 
 def test_a_single_mass_in_a_structure_is_the_vibration_model():
     conditions = papers_contact(500.0)
     model = VibrationModel(mass=0.1, damping_ratio=0.02)
-    resonance = structural_resonance(Structure.single_mass(0.1), conditions, model)
+    named = NamedStructure(name="a mass", structure=Structure.single_mass(0.1))
+    resonance = structural_resonance(named, conditions, model)
     assert resonance.band_hz == pytest.approx(search_band(conditions, model), rel=1e-6)
     assert resonance.contact_share == pytest.approx(1.0, rel=1e-6)
     assert resonance.damping_ratio == pytest.approx(0.02, rel=1e-6)
     assert resonance.on_single_mass(3000.0) == pytest.approx(3000.0, rel=1e-6)
     assert resonance.single_mass_slope(3000.0) == pytest.approx(1.0, rel=1e-6)
+    full = resonance.full_load_hz
+    assert resonance.load_share(0.8 * full) == pytest.approx(0.8**6, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["twin-disc", "fzg-gears"])
+def test_the_damping_of_the_followed_mode_is_that_of_the_coupled_mode(name):
+    """Whatever the sign of its eigenvectors at neighbouring stiffnesses."""
+    structure = load_structure(name).structure
+    mode = contact_mode(structure, 3e7, 5e8)
+    for k in np.geomspace(4e7, 4.5e8, 23):
+        frequency_hz = float(np.exp(mode.log_frequency(np.log(k))))
+        exact = min(
+            coupled_modes(structure, float(k), 300.0),
+            key=lambda m: abs(m.frequency_hz - frequency_hz),
+        )
+        assert frequency_hz == pytest.approx(exact.frequency_hz, rel=1e-5)
+        assert mode.total_damping(np.log(k), 300.0) == pytest.approx(exact.damping_ratio, rel=0.01)
+
+
+def test_a_line_contact_on_the_spring_of_a_sphere_is_refused_in_a_structure():
+    named = load_structure("twin-disc")
+    case = load_case(Path(__file__).parents[2] / "examples" / "paper.toml")
+    with pytest.raises(BadInput, match="'hertz-point' is that of a sphere, far softer than this"):
+        structural_resonance(named, case.conditions, case.vibration)
 
 
 def rig(tmp_path, structure, **settings):
@@ -145,7 +179,7 @@ def test_recordings_through_a_structure_show_its_modes(tmp_path):
     case, simulated = rig(tmp_path, "holder.toml")
     first = simulated.recordings[0]
     structure, model = case.structure.structure, case.vibration
-    resonance = structural_resonance(structure, case.conditions, model)
+    resonance = structural_resonance(case.structure, case.conditions, model)
     assert resonance.band_hz == simulated.band_hz
     k = float(resonance.mode.stiffness_at(first.crf_hz))
     frequencies_hz = np.array([0.9, 1.0, 1.1]) * first.crf_hz
@@ -160,22 +194,24 @@ def test_recordings_through_a_structure_show_its_modes(tmp_path):
     for recording, true in zip(track.recordings, simulated.recordings, strict=True):
         error = recording.resonance.crf_hz - true.crf_hz
         assert abs(error) < 4.0 * recording.resonance.crf_std
-        assert recording.clr == pytest.approx(true.clr, abs=0.15)
+        # the structure's frequencies are known to 5 %: nearly nothing of the load share
+        low, high = recording.clr_interval
+        assert low <= true.clr <= high
+        assert high - low > 0.5
 
 
 def test_a_mode_with_little_of_the_contact_gives_no_stage(tmp_path):
     (tmp_path / "stiff.toml").write_text(STIFF, "utf-8")
     case, simulated = rig(tmp_path, "stiff.toml")
-    assert structural_resonance(
-        case.structure.structure, case.conditions, case.vibration
-    ).contact_share == pytest.approx(0.028, abs=0.003)
+    resonance = structural_resonance(case.structure, case.conditions, case.vibration)
+    assert resonance.contact_share == pytest.approx(0.014, abs=0.003)
     paths = write_rig(simulated, tmp_path / "rig")
     track = track_recordings(
         paths, TrackSettings(), case=case, table=read_table(tmp_path / "rig" / "table.csv")
     )
     assert track.stages is None
     assert all(math.isnan(recording.clr) for recording in track.recordings)
-    note = "No wear stage is determined: the contact has 2.8 % of the strain energy"
+    note = "No wear stage is determined: the contact has 1."
     assert any(entry.startswith(note) for entry in track.notes)
 
 
@@ -188,14 +224,15 @@ def inference_case(tmp_path_factory):
 
 
 def with_structure(setting, folder, name):
-    case = replace(setting.case, folder=folder).with_written({"structure": name})
+    line = {"structure": name, "vibration.stiffness_law": "hertz-line"}
+    case = replace(setting.case, folder=folder).with_written(line)
     return replace(setting, case=case)
 
 
 def test_a_resonance_in_a_structure_is_that_of_the_mass_on_the_contact(inference_case):
     """One mass on a support: k = (2πf)² m - K, ζ of 0.1 kg on k from c = (2 ζ m ω - C)."""
     setting = with_structure(formula_setting(), inference_case, "holder.toml")
-    f, zeta = 900.0, 0.012
+    f, zeta = 2400.0, 0.012
     measured = Observation(
         load_n=500.0,
         entrainment_m_s=2.0,
@@ -208,7 +245,7 @@ def test_a_resonance_in_a_structure_is_that_of_the_mass_on_the_contact(inference
     (found,) = on_single_mass(setting, ObservedSeries(observations=(measured,))).observations
     mass = setting.case.vibration.mass
     angular = 2.0 * math.pi * f
-    k, c = angular**2 * 2.0 - 2e7, 2.0 * zeta * angular * 2.0 - 60.0
+    k, c = angular**2 * 2.0 - 2e8, 2.0 * zeta * angular * 2.0 - 200.0
     assert found.crf_hz == pytest.approx(math.sqrt(k / mass) / (2.0 * math.pi), rel=1e-4)
     slope = 2.0 * angular**2 / k * found.crf_hz / f
     assert found.crf_std_hz == pytest.approx(2.0 * slope, rel=0.01)

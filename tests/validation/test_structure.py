@@ -290,7 +290,7 @@ def test_modes_of_damped_receptances_are_the_complex_ones():
     assert sensor_response(measured, k, c, places)[0] == 0.0
 
 
-@pytest.mark.parametrize("noise", [1e-3, 1e-2])
+@pytest.mark.parametrize("noise", [1e-3, 3e-3])
 def test_noise_of_receptances_moves_their_modes_little(noise):
     base = chain(4, 0.5, 1e7, 1)
     model = replace(base, damping=2.0 * np.eye(4) + 1e-6 * base.stiffness)
@@ -311,8 +311,8 @@ def test_noise_of_receptances_moves_their_modes_little(noise):
     ]
     assert len(found) == len(expected)
     for mode, exact in zip(found, expected, strict=True):
-        assert mode.frequency_hz == pytest.approx(exact.frequency_hz, rel=0.3 * noise + 5e-4)
-        assert mode.contact_share == pytest.approx(exact.contact_share, rel=5.0 * noise + 0.01)
+        assert mode.frequency_hz == pytest.approx(exact.frequency_hz, rel=5e-4)
+        assert mode.contact_share == pytest.approx(exact.contact_share, rel=0.02)
 
 
 def test_receptances_with_a_stiffness_over_frequency_settle_like_the_matrices():

@@ -65,6 +65,8 @@ class Case(Brief):
     def __post_init__(self) -> None:
         # report errors now rather than after a long computation
         for name, part in CHECKED.items():
+            if name == "structure" and self.stored is not None:
+                continue  # of a saved run, which does not need it
             if name == "grid" and self._is_measured and self.contents.grid.chosen:
                 continue  # would need its file
             with self.naming(part):

@@ -1,6 +1,7 @@
 """Measured capacitances of a contact from a table."""
 
 import csv
+from math import isfinite, nan
 from pathlib import Path
 
 from asperity.core.errors import BadInput, UnreadableFile
@@ -30,8 +31,11 @@ def read_capacitances(path: str | Path) -> tuple[Observation, ...]:
     require_file(path)
     if path.stat().st_size > MAX_BYTES:
         raise UnreadableFile(f"{path} has {path.stat().st_size} bytes, too many for a table")
-    with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
-        rows = list(csv.DictReader(file, skipinitialspace=True))
+    try:
+        with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
+            rows = list(csv.DictReader(file, skipinitialspace=True))
+    except csv.Error as error:
+        raise UnreadableFile(f"{path} is not a table: {error}") from None
     if not rows or any(name not in rows[0] for name in REQUIRED):
         raise UnreadableFile(f"{path} needs rows with the columns {', '.join(REQUIRED)}")
     return tuple(_observation(row, f"{path}, line {line}") for line, row in enumerate(rows, 2))
@@ -40,9 +44,12 @@ def read_capacitances(path: str | Path) -> tuple[Observation, ...]:
 def _observation(row: dict[str, str], place: str) -> Observation:
     def number(name: str) -> float:
         try:
-            return float(row[name])
+            value = float(row[name])
         except (TypeError, ValueError):
-            raise BadInput(f"{place}: {name} must be a number, got {row[name]!r}") from None
+            value = nan
+        if not isfinite(value):
+            raise BadInput(f"{place}: {name} must be a number, got {row[name]!r}")
+        return value
 
     return Observation(
         load_n=number("load_n"),

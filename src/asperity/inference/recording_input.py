@@ -114,7 +114,7 @@ def resonance_band(setting: Setting) -> tuple[float, float]:
         if structure is None:
             bands.append(search_band(at_load, model))
         else:
-            bands.append(structural_resonance(structure.structure, at_load, model).band_hz)
+            bands.append(structural_resonance(structure, at_load, model).band_hz)
     low, high = bands[0][0], bands[1][1]
     mass = next((unknown for unknown in setting.unknowns if unknown.key == "mass_kg"), None)
     if mass is None:

@@ -7,7 +7,9 @@ from typing import Literal
 
 from asperity.case import Case, InferSection, PriorSection, SheetSection, split_amount
 from asperity.core.errors import BadInput
+from asperity.coupling import structural_resonance
 from asperity.inference.priors import Unknown
+from asperity.structure import MIN_CONTACT_SHARE
 from asperity.study import ParameterRange, full_key, overrides_at, require_ranges, stated_value
 
 LOAD = "contact.load"
@@ -232,12 +234,24 @@ def _unknown(
     number, unit = split_amount(case_value)
     mean = float(number)
     if not math.isnan(default.relative_std):
-        return Unknown.stated(
-            default.key, key, mean, default.relative_std * mean, unit, default.reason
-        )
+        std = default.relative_std * mean
+        if key == "vibration.mass" and case.structure is not None:
+            std = max(std, _structural_mass_std(case) * mean)
+        return Unknown.stated(default.key, key, mean, std, unit, default.reason)
     low, high = default.limits or (mean / default.factor, mean * default.factor)
     entry = ParameterRange(key, float(f"{low:.4g}"), float(f"{high:.4g}"), unit, default.reason)
     return Unknown(default.key, _resolved(case, entry, operating))
+
+
+def _structural_mass_std(case: Case) -> float:
+    """Return the relative uncertainty of the mass that stands for that of the structure.
+
+    An error of the mode's frequency is one of the frequency on the mass over the contact's share.
+    """
+    assert case.structure is not None
+    assert case.vibration is not None
+    resonance = structural_resonance(case.structure, case.conditions, case.vibration)
+    return 2.0 * resonance.frequency_std / max(resonance.contact_share, MIN_CONTACT_SHARE)
 
 
 def _own_value(case: Case, key: str) -> object:

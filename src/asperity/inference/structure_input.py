@@ -26,7 +26,7 @@ def on_single_mass(setting: Setting, series: ObservedSeries) -> ObservedSeries:
         return series
     heaviest = next(entry for entry in setting.operating if entry.key == LOAD)
     heavy = case.with_written(overrides_at(case, [heaviest], [1.0])).conditions
-    resonance = structural_resonance(case.structure.structure, heavy, case.vibration)
+    resonance = structural_resonance(case.structure, heavy, case.vibration)
     observations, excluded = [], list(series.excluded)
     for observation in series.observations:
         reason = _objection(observation, resonance)
@@ -52,9 +52,10 @@ def on_single_mass(setting: Setting, series: ObservedSeries) -> ObservedSeries:
 
 def _objection(observation: Observation, resonance: StructuralResonance) -> str:
     """Return why a resonance says nothing about the contact; "" if it does."""
-    share = resonance.contact_share
     if np.isnan(observation.crf_hz):
         return ""
+    stiffness = resonance.mode.stiffness_at(observation.crf_hz)
+    share = float(2.0 * resonance.mode.log_slope(np.log(stiffness)))
     if share < MIN_CONTACT_SHARE:
         return (
             f"the contact has {100.0 * share:.2g} % of the strain energy of its mode, less than "
@@ -109,7 +110,7 @@ def _damping(observation: Observation, resonance: StructuralResonance) -> tuple[
     of_contact = observation.damping_ratio - own
     if not of_contact > 0.0:  # nan too
         return nan, nan
-    mass = resonance.springs[1].mass
+    mass = resonance.springs[-1].mass
     critical = 2.0 * sqrt(float(np.exp(place)) * mass)
     scale = 1.0 / (per_damping - own) / critical
     return scale * of_contact, scale * observation.damping_std

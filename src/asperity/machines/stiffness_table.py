@@ -1,8 +1,8 @@
 """Stiffness and damping of a machine's contacts as a table for rotor dynamics.
 
 The contacts are solved as snapshots of standing roughness. A bearing's coefficients are sums over
-its rolling elements, inner and outer contact in series; rings are rigid, the mass of the rolling
-elements is left out.
+its rolling elements, inner and outer contact in series; rings are rigid, free along the axis and,
+unless their tilt is stated, free to tilt. The mass of the rolling elements is left out.
 """
 
 import json
@@ -16,6 +16,7 @@ import numpy.typing as npt
 import pandas
 
 from asperity.case import MachineCase
+from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
 from asperity.core.files import write_csv
 from asperity.machine import BallBearing, CylindricalRollerBearing, MachineContact, TwinDisc
@@ -122,7 +123,9 @@ def _springs(case: MachineCase, count: Callable[[], None]) -> Springs:
         )
         run = solve_case(snapshot.among_many, groups=())
         spring = OscillatingContact(run.solution).evaluate(speed / (2.0 * math.pi))
-        by_conditions[key] = complex(spring.stiffness, speed * spring.damping)
+        # the most loaded slice is solved over the whole length
+        loaded = contact.load / snapshot.conditions.load
+        by_conditions[key] = loaded * complex(spring.stiffness, speed * spring.damping)
         count()
     return {
         contact.name: by_conditions[json.dumps(case.contact_table(contact))]
@@ -160,18 +163,31 @@ def _rows(case: MachineCase, springs: Springs) -> list[dict[str, object]]:
 
 
 def _bearing_matrix(case: MachineCase, springs: Springs) -> npt.NDArray[np.complex128]:
-    """Return the complex stiffness of the inner ring across its axis, shape (2, 2) [N/m]."""
+    """Return the complex stiffness of the inner ring across its axis, shape (2, 2) [N/m].
+
+    Under constant thrust and, if the ring is free to tilt, without moment.
+    """
     machine = case.machine
     angles = machine.loads(case.pair)[1] if isinstance(machine, BallBearing) else None
     elements: dict[str, list[MachineContact]] = {}
     for contact in case.contacts:
         elements.setdefault(contact.name.partition(",")[0], []).append(contact)
-    matrix = np.zeros((2, 2), dtype=complex)
+    matrix = np.zeros((5, 5), dtype=complex)
     for name, contacts in elements.items():
         series = 1.0 / sum(1.0 / springs[contact.name] for contact in contacts)
-        position = contacts[0].position
-        contact_angle = 0.0 if angles is None else float(angles[int(name.split()[1])])
-        across = math.cos(contact_angle) * np.array([math.cos(position), math.sin(position)])
-        matrix += series * np.outer(across, across)
-    rounding = 1e-12 * np.abs(matrix).max()
-    return np.where(np.abs(matrix) > rounding, matrix, 0.0)
+        angle = 0.0 if angles is None else float(angles[int(name.split()[1])])
+        normal = _normal(contacts[0].position, angle)
+        matrix += series * np.outer(normal, normal)
+    free_tilt = isinstance(machine, BallBearing) and machine.tilt is None
+    free = slice(2, 5 if free_tilt else 3)
+    coupled = matrix[:2, free]
+    across = matrix[:2, :2] - coupled @ np.linalg.pinv(matrix[free, free], rcond=1e-9) @ coupled.T
+    rounding = 1e-12 * np.abs(across).max()
+    return np.where(np.abs(across) > rounding, across, 0.0)
+
+
+def _normal(position: float, contact_angle: float) -> Field:
+    """Return the approach in a contact per motion: across x and y, along the axis, two tilts."""
+    cosine, sine = math.cos(position), math.sin(position)
+    across, along = math.cos(contact_angle), math.sin(contact_angle)
+    return np.array([across * cosine, across * sine, along, along * cosine, along * sine])

@@ -3,8 +3,11 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from asperity.case import Case, MachineCase
 from asperity.core.arrays import Field
+from asperity.core.coverage import NORMAL_FACTOR
 from asperity.core.errors import BadInput, require_positive
 from asperity.coupling import BAND_MARGIN, StructuralResonance, search_band, structural_resonance
 from asperity.paper import papers_case
@@ -41,7 +44,7 @@ class Target:
     def unresponsive(self) -> str:
         """Reason why the mode says too little about the contact for a wear stage; else ""."""
         mode = self.structural
-        if mode is None or mode.contact_share >= MIN_CONTACT_SHARE:
+        if mode is None or not mode.unresponsive:
             return ""
         return (
             f"No wear stage is determined: the contact has {100.0 * mode.contact_share:.2g} % of "
@@ -51,16 +54,20 @@ class Target:
         )
 
     def load_share(self, crf_hz: Field, crf_std_hz: Field) -> LoadShare | None:
-        """Return the load share of the asperities by CRF; None without a responsive model."""
+        """Return the load share of the asperities by CRF; None without a responsive model.
+
+        In a structure its interval includes the uncertainty of the structure's frequencies.
+        """
         if self.full_load_crf_hz is None or self.unresponsive:
             return None
         if self.structural is None:
             return asperity_load_share(crf_hz, crf_std_hz, self.full_load_crf_hz)
-        return asperity_load_share(
-            self.structural.on_single_mass(crf_hz),
-            crf_std_hz * self.structural.single_mass_slope(crf_hz),
-            self.structural.springs[1].natural_frequency_hz,
+        half = NORMAL_FACTOR * np.hypot(crf_std_hz, self.structural.frequency_std * crf_hz)
+        clr, low, high = (
+            np.where(np.isfinite(crf_hz), self.structural.load_share(ends), np.nan)
+            for ends in (crf_hz, np.maximum(crf_hz - half, 1.0), crf_hz + half)
         )
+        return LoadShare(clr=clr, interval=(low, high))
 
 
 def search_target(
@@ -97,7 +104,7 @@ def search_target(
         )
     structural = None
     if contact.structure is not None:
-        structural = structural_resonance(contact.structure.structure, contact.conditions, model)
+        structural = structural_resonance(contact.structure, contact.conditions, model)
     possible = search_band(contact.conditions, model) if structural is None else structural.band_hz
     searched = possible if band_hz is None else _valid_band(band_hz)
     damping_ratio = model.damping_ratio if structural is None else structural.damping_ratio

@@ -6,6 +6,7 @@ accelerometer signal are drawn anew for each rig: structural modes, shaft and ma
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -42,6 +43,7 @@ from asperity.paper.rig_recording import (
     Disturbance,
     RigRecording,
     RigTest,
+    StructureLines,
     contact_line,
     draw_background,
 )
@@ -207,9 +209,17 @@ def simulate_rig(
         disturbance=disturbance,
         load_n=conditions.load,
         shaft_hz=SHAFT_HZ,
-        case_text=(case or rig_case()).text,
+        case_text=_case_text(case or rig_case()),
         hours=None if moments is None else tuple(moment.hours for moment in moments),
     )
+
+
+def _case_text(case: Case) -> str:
+    """Return the case as TOML for another folder: a structure's file with its whole path."""
+    stated = case.contents.structure
+    if stated is None or not Path(stated).suffix:
+        return case.text
+    return case.with_written({"structure": str((case.folder / stated).absolute())}).text
 
 
 class _Rings(NamedTuple):
@@ -267,10 +277,13 @@ class _Rings(NamedTuple):
     ) -> ContactLine:
         """Return the line of a test, shifted at random."""
         shift = self.settings.repeat_std_hz * rng.standard_normal() / self.full_load_crf_hz
-        shifted = _shifted(state, shift)
         rate_hz = self.settings.rate_hz
         structure = None if self.case is None else self.case.structure
-        return contact_line(shifted, self.conditions, model, self.frequency, rate_hz, structure)
+        if structure is None:
+            shifted = _shifted(state, shift)
+            return contact_line(shifted, self.conditions, model, self.frequency, rate_hz)
+        lines = StructureLines(structure, self.conditions, model)
+        return lines.line(state, self.frequency, rate_hz, shift)
 
 
 def _full_load_crf_hz(
@@ -281,7 +294,7 @@ def _full_load_crf_hz(
 ) -> float:
     """Return the resonance with all load on asperities [Hz]."""
     if structure is not None:
-        return structural_resonance(structure.structure, conditions, model).full_load_hz
+        return structural_resonance(structure, conditions, model).full_load_hz
     full_load = replace(dry_full_load(conditions, sq), clr=1.0)
     return oscillator(
         full_load, conditions, model.with_choices(damping_law="ratio")
@@ -341,7 +354,7 @@ def _band(
     if structure is None:
         band_hz = search_band(conditions, model)
     else:
-        band_hz = structural_resonance(structure.structure, conditions, model).band_hz
+        band_hz = structural_resonance(structure, conditions, model).band_hz
     if rate_hz < MIN_RATE_RATIO * band_hz[1]:
         minimum = f"{MIN_RATE_RATIO:g} times the upper end of the search band, {band_hz[1]:.0f} Hz"
         raise BadInput(

@@ -1,5 +1,6 @@
 """Recording of the simulated rig: line of the contact, disturbances, and records of both."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from typing import NamedTuple
@@ -225,38 +226,66 @@ def contact_line(
     model: VibrationModel,
     frequency: Field,
     rate_hz: float,
-    structure: NamedStructure | None = None,
 ) -> ContactLine:
-    """Return the contact's line: |H|^2 of the oscillator times the excitation's spectrum.
-
-    In a structure H is that from roughness to the sensor, and the line that of the mode which
-    follows the contact.
-    """
+    """Return the contact's line: |H|^2 of the oscillator times the excitation's spectrum."""
     spring = oscillator(state, conditions, model)
-    base_excitation = excitation(state, conditions, model)
-    f0, damping_ratio = spring.natural_frequency_hz, spring.damping_ratio
-    if structure is not None:
-        resonance = structural_resonance(structure.structure, conditions, model)
-        place = np.log(spring.stiffness)
-        f0 = float(np.exp(resonance.mode.log_frequency(place)))
-        damping_ratio = float(resonance.mode.total_damping(place, spring.damping))
-
-    def gain(at: Field) -> Field:
-        if structure is None:
-            return spring.gain(at)
-        response = sensor_response(structure.structure, spring.stiffness, spring.damping, at)
-        return np.asarray((2.0 * np.pi * at) ** 4 * np.abs(response) ** 2)
+    excited = excitation(state, conditions, model)
 
     def density(at: Field) -> Field:
-        return np.asarray(
-            gain(at) * base_excitation.density(at, rate_hz) * _accelerometer(at, rate_hz)
-        )
+        return np.asarray(spring.gain(at) * excited.density(at, rate_hz))
 
-    measured = np.zeros(frequency.size)
-    measured[1:] = density(frequency[1:])
-    return ContactLine(
-        state.sq, state.clr, f0, float(density(np.array([f0]))[0]), damping_ratio, measured
-    )
+    resonance = spring.natural_frequency_hz, spring.damping_ratio
+    return _measured_line(state, resonance, density, frequency, rate_hz)
+
+
+def _measured_line(
+    state: ContactState,
+    resonance: tuple[float, float],
+    density: Callable[[Field], Field],
+    frequency: Field,
+    rate_hz: float,
+) -> ContactLine:
+    """Return the line of a resonance [Hz, ratio] by its density, with the accelerometer's gain."""
+
+    def measured(at: Field) -> Field:
+        return np.asarray(density(at) * _accelerometer(at, rate_hz))
+
+    values = np.zeros(frequency.size)
+    values[1:] = measured(frequency[1:])
+    (f0, damping_ratio) = resonance
+    height = float(np.ravel(measured(np.array(f0)))[0])
+    return ContactLine(state.sq, state.clr, f0, height, damping_ratio, values)
+
+
+class StructureLines(NamedTuple):
+    """Lines of a contact at the sensor of a machine structure."""
+
+    structure: NamedStructure
+    conditions: ContactConditions
+    model: VibrationModel
+
+    def line(
+        self, state: ContactState, frequency: Field, rate_hz: float, shift: float
+    ) -> ContactLine:
+        """Return the line of a contact whose mode is shifted by a relative `shift`.
+
+        H is the motion of the sensor for that of the roughness, and the line that of the mode which
+        follows the contact.
+        """
+        spring = oscillator(state, self.conditions, self.model)
+        resonance = structural_resonance(self.structure, self.conditions, self.model)
+        f0 = float(np.exp(resonance.mode.log_frequency(np.log(spring.stiffness))))
+        f0 *= 1.0 + shift
+        stiffness = float(resonance.mode.stiffness_at(f0))
+        damping_ratio = float(resonance.mode.total_damping(np.log(stiffness), spring.damping))
+        excited = excitation(state, self.conditions, self.model)
+
+        def density(at: Field) -> Field:
+            motion = sensor_response(self.structure.structure, stiffness, spring.damping, at)
+            gain = (2.0 * np.pi * at) ** 4 * np.abs(motion) ** 2
+            return np.asarray(gain * excited.density(at, rate_hz))
+
+        return _measured_line(state, (f0, damping_ratio), density, frequency, rate_hz)
 
 
 def _accelerometer(frequency: Field, rate_hz: float) -> Field:

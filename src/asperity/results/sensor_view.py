@@ -27,6 +27,7 @@ from asperity.structure import (
 
 RESOLUTION = 1e-3  # relative, of a frequency
 MAX_MODES = 12
+BLIND = 1e-6  # of the motion at the sensor over the approach in the contact
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,6 +116,7 @@ class SensorView(Displayed):
             observed
             for observed in self.modes
             if observed.movement > self.resolution
+            and abs(observed.mode.sensor_shape) > BLIND * abs(observed.mode.contact_shape)
             and (
                 noise is None
                 or observed.amplitude_at_sensor is None
@@ -143,6 +145,8 @@ class SensorView(Displayed):
         best = max(self.visible or self.modes, key=lambda observed: observed.movement)
         can = "can" if self.visible else "cannot"
         reason = "" if best.movement <= self.resolution or self.visible else ", below the noise"
+        if self.visible and self.named.noise is None:
+            reason = " (the sensor's noise is not stated)"
         weak = (
             "" if best.mode.contact_share >= MIN_CONTACT_SHARE else ", which says little about it"
         )

@@ -52,7 +52,7 @@ def oil_flow(solution: ContactSolution) -> OilFlow:
     before = (problem.entering(balance.gap) - 2.0 * faces.inlet * pressure[0] / dx)[inner]
     behind = (balance.content[-1] + 2.0 * faces.east[-1] * pressure[-1] / dx)[inner]
     entering, leaving = float(before.sum()) * dy, float(behind.sum()) * dy
-    beside = _beside(balance)
+    beside = _side_flow(balance)
     rate = scales.gap * scales.length * solution.conditions.entrainment_speed
     return OilFlow(
         entering=rate * entering,
@@ -65,7 +65,7 @@ def oil_flow(solution: ContactSolution) -> OilFlow:
     )
 
 
-def _beside(balance: MixedBalance) -> float:
+def _side_flow(balance: MixedBalance) -> float:
     """Return the flow through the sides, in the solver's units; 0 for a contact periodic in y."""
     (dx, dy), north, pressure = balance.problem.spacing, balance.faces.north, balance.oil_pressure
     if balance.problem.form.periodic:

@@ -10,6 +10,7 @@ from .mode_course import contact_mode as contact_mode
 from .modes import CoupledMode as CoupledMode
 from .modes import coupled_modes as coupled_modes
 from .modes import settled_modes as settled_modes
+from .rational import RationalFit as RationalFit
 from .receptance import Receptances as Receptances
 from .receptance import coupled_receptance as coupled_receptance
 from .receptance import receptance_modes as receptance_modes

@@ -9,6 +9,7 @@ from asperity.core.errors import BadInput
 from asperity.structure.matrices import Structure
 
 GROUND = "ground"
+MAX_BODIES = 300
 BODY_KEYS = ("bodies", "springs", "contact", "sensor", "stiffness_damping")
 SPRING_KEYS = ("between", "stiffness", "damping")
 
@@ -46,8 +47,21 @@ def structure_of_bodies(content: Mapping[str, object]) -> Structure:
     """
     masses = _table("bodies", content["bodies"])
     names = tuple(masses)
-    springs = content.get("springs", ())
+    if GROUND in names or len(names) > MAX_BODIES:
+        raise BadInput(f"bodies must be at most {MAX_BODIES}, none of them called {GROUND}")
     ratio = _number("stiffness_damping", content.get("stiffness_damping", 0.0))
+    stiffness, damping = _assembled(content.get("springs", ()), names, ratio)
+    return Structure(
+        mass=np.diag(list(masses.values())),
+        stiffness=stiffness,
+        damping=damping,
+        contact=_displacement("contact", content["contact"], names),
+        sensor=_displacement("sensor", content["sensor"], names),
+    )
+
+
+def _assembled(springs: object, names: Sequence[str], ratio: float) -> tuple[Field, Field]:
+    """Return the stiffness and damping matrices of springs; damping over stiffness is `ratio`."""
     if not isinstance(springs, Sequence) or not all(
         isinstance(entry, Mapping) for entry in springs
     ):
@@ -58,18 +72,14 @@ def structure_of_bodies(content: Mapping[str, object]) -> Structure:
             raise BadInput(
                 f"unknown key {unknown[0]!r} in spring {number}; use {', '.join(SPRING_KEYS)}"
             )
+        if missing := [key for key in SPRING_KEYS[:2] if key not in spring]:
+            raise BadInput(f"spring {number} has no {missing[0]}; add it")
         stretch = _stretch(number, spring["between"], names)
         own = _number(f"stiffness of spring {number}", spring["stiffness"])
-        stiffness += own * np.outer(stretch, stretch)
         friction = _number(f"damping of spring {number}", spring.get("damping", ratio * own))
+        stiffness += own * np.outer(stretch, stretch)
         damping += friction * np.outer(stretch, stretch)
-    return Structure(
-        mass=np.diag(list(masses.values())),
-        stiffness=stiffness,
-        damping=damping,
-        contact=_displacement("contact", content["contact"], names),
-        sensor=_displacement("sensor", content["sensor"], names),
-    )
+    return stiffness, damping
 
 
 def _stretch(number: int, between: object, names: Sequence[str]) -> Field:

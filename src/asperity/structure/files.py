@@ -21,6 +21,8 @@ from asperity.structure.receptance import Receptances
 from asperity.structure.universal_file import FREQUENCY_RESPONSE, POWER_SPECTRUM, REMEDY, Function
 
 MACHINES = Path(__file__).parent / "machines"
+FREQUENCY_STD = 0.05  # relative, of a structure whose masses and springs were not measured
+MAX_LENGTH = {1: 100_000, 2: 500}  # of frequencies or modes; of matrices
 MAX_BYTES = 20_000_000  # of a file: matrices of a thousand degrees of freedom
 MATRIX_KEYS = ("mass", "stiffness", "damping", "contact", "sensor")
 MODE_KEYS = ("frequency_hz", "damping_ratio", "contact", "sensor")
@@ -45,11 +47,15 @@ class SensorNoise:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class NamedStructure:
-    """Structure without its contact, with its name, and the noise of its sensor, if known."""
+    """Structure without its contact, with its name, and the noise of its sensor, if known.
+
+    `frequency_std` is the relative standard deviation of its frequencies.
+    """
 
     name: str
     structure: Structure | Receptances
     noise: SensorNoise | None = None
+    frequency_std: float = FREQUENCY_STD
 
 
 def machine_structures() -> tuple[str, ...]:
@@ -69,8 +75,9 @@ def load_structure(path: str | Path, *, folder: Path | None = None) -> NamedStru
       `transfer_imag`,
 
     as keys of TOML, where modes stand in `[modes]`; all but bodies also as variables of netCDF, and
-    modes and receptances as columns of csv. TOML and the attributes of netCDF may state `name` and
-    `noise` [m/s²/√Hz].
+    modes and receptances as columns of csv. TOML and the attributes of netCDF may state `name`,
+    `noise` [m/s²/√Hz] and `frequency_std`, the relative standard deviation of its frequencies (0.05
+    by default).
 
     `[receptances]` in TOML names a universal `file` (data set 58, function type 4) and in it
     `body_1`, perhaps `body_2`, and `sensor`, each as node and axis such as "11Z", both bodies along
@@ -117,26 +124,30 @@ def load_structure(path: str | Path, *, folder: Path | None = None) -> NamedStru
         raise
     except KeyError as missing:
         raise BadInput(f"{path}: {missing.args[0]} is missing; add it") from None
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         reason = str(error) if isinstance(error, BadInput) else f"not numbers ({error})"
         raise BadInput(f"{path}: {reason}") from None
 
 
 def _named(path: Path, content: Content) -> NamedStructure:
-    noise = _noise(content.get("noise"))
-    nodes = content.get("receptances")
+    noise = _positive(content, "noise", " in m/s²/√Hz", None)
+    sensor_noise = None if noise is None else SensorNoise(np.zeros(1), np.full(1, noise))
+    nodes, modes = content.get("receptances"), content.get("modes")
+    structure: Structure | Receptances
     if isinstance(nodes, Mapping):
         _require_keys("[receptances]", nodes, NODE_KEYS)
         structure, measured = _measured(path, nodes)
-        return NamedStructure(
-            name=str(content.get("name", path.stem)), structure=structure, noise=noise or measured
-        )
-    modes = content.get("modes")
-    if isinstance(modes, Mapping):
-        _require_keys("[modes]", modes, MODE_KEYS)
-        content = {**content, **modes}
+        sensor_noise = sensor_noise or measured
+    else:
+        if isinstance(modes, Mapping):
+            _require_keys("[modes]", modes, MODE_KEYS)
+            content = {**content, **modes}
+        structure = _structure(content)
     return NamedStructure(
-        name=str(content.get("name", path.stem)), structure=_structure(content), noise=noise
+        name=str(content.get("name", path.stem)),
+        structure=structure,
+        noise=sensor_noise,
+        frequency_std=_positive(content, "frequency_std", "", FREQUENCY_STD) or FREQUENCY_STD,
     )
 
 
@@ -153,6 +164,11 @@ def _structure(content: Content) -> Structure | Receptances:
     if "frequency_hz" in content:
         frequencies_hz, ratios, contact, sensor = (_numbers(content, key) for key in MODE_KEYS)
         return Structure.from_modes(frequencies_hz, ratios, contact=contact, sensor=sensor)
+    if "mass" not in content:
+        raise BadInput(
+            "it has no structure: give bodies, matrices with mass, modes with frequency_hz, or "
+            "receptances with approach_real"
+        )
     mass = _numbers(content, "mass")
     return Structure(
         mass=mass,
@@ -164,7 +180,10 @@ def _structure(content: Content) -> Structure | Receptances:
 
 
 def _numbers(content: Content, key: str) -> Field:
-    return np.asarray(content[key], dtype=float)
+    values = np.asarray(content[key], dtype=float)
+    if values.ndim and len(values) > MAX_LENGTH[min(values.ndim, 2)]:
+        raise BadInput(f"{key} has {len(values)} entries, too many; reduce the structure")
+    return values
 
 
 def _require_keys(table: str, content: Content, keys: tuple[str, ...]) -> None:
@@ -172,12 +191,15 @@ def _require_keys(table: str, content: Content, keys: tuple[str, ...]) -> None:
         raise BadInput(f"unknown key {unknown[0]!r} in {table}; use {', '.join(keys)}")
 
 
-def _noise(value: object) -> SensorNoise | None:
+def _positive(content: Content, key: str, unit: str, default: float | None) -> float | None:
+    value = content.get(key, default)
     if value is None:
         return None
+    if isinstance(value, np.ndarray | list) and np.size(value) == 1:  # of netCDF
+        value = np.ravel(np.asarray(value))[0].item()
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < np.inf:
-        raise BadInput(f"noise must be a positive number in m/s²/√Hz, got {value!r}")
-    return SensorNoise(np.zeros(1), np.full(1, float(value)))
+        raise BadInput(f"{key} must be a positive number{unit}, got {value!r}")
+    return float(value)
 
 
 # Formats
@@ -190,7 +212,7 @@ def _read_toml(path: Path) -> Content:
     except (OSError, ValueError, RecursionError) as error:
         raise UnreadableFile(f"{path} is not valid TOML: {error}") from None
     try:
-        known = ("name", "noise", "modes", "receptances")
+        known = ("name", "noise", "frequency_std", "modes", "receptances")
         kind = BODY_KEYS if "bodies" in content else MATRIX_KEYS
         _require_keys("the file", content, (*known, *kind))
     except BadInput as error:
@@ -199,8 +221,11 @@ def _read_toml(path: Path) -> Content:
 
 
 def _read_csv(path: Path) -> Content:
-    with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
-        rows = [row for row in csv.reader(file, skipinitialspace=True) if row]
+    try:
+        with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
+            rows = [[cell.strip() for cell in row] for row in csv.reader(file) if row]
+    except csv.Error as error:
+        raise UnreadableFile(f"{path} is not a table: {error}") from None
     if len(rows) < 2 or any(len(row) != len(rows[0]) for row in rows):
         raise UnreadableFile(f"{path} is not a table: give it a heading and full rows")
     return dict(zip(rows[0], zip(*rows[1:], strict=True), strict=True))
@@ -209,9 +234,8 @@ def _read_csv(path: Path) -> Content:
 def _read_netcdf(path: Path) -> Content:
     names = {*MATRIX_KEYS, *MODE_KEYS, *RECEPTANCE_KEYS}
     dataset = read_netcdf(path, sorted(names), "write the structure again", sealed=False)
-    stated = {key: dataset.attrs[key] for key in ("name", "noise") if key in dataset.attrs}
-    if "noise" in stated:
-        stated["noise"] = float(np.ravel(stated["noise"])[0])
+    known = ("name", "noise", "frequency_std")
+    stated = {key: dataset.attrs[key] for key in known if key in dataset.attrs}
     return {**{str(name): dataset[name].to_numpy() for name in dataset.variables}, **stated}
 
 
@@ -220,11 +244,7 @@ def _measured(path: Path, nodes: Content) -> tuple[Receptances, SensorNoise | No
     file = path.parent / str(nodes["file"])
     functions = _functions(file)
     first, second, sensor = (str(nodes.get(key, "")) for key in ("body_1", "body_2", "sensor"))
-    found = {
-        frozenset((response, reference)): (frequencies_hz, values)
-        for kind, response, reference, frequencies_hz, values in functions
-        if kind == FREQUENCY_RESPONSE
-    }
+    found = _responses(file, functions, {first, second, sensor})
     required = [(first, first), (sensor, first), *([(second, second)] if second else [])]
     _require_responses(file, found, required)
     frequencies_hz, _ = found[frozenset((first,))]
@@ -243,6 +263,24 @@ def _measured(path: Path, nodes: Content) -> tuple[Receptances, SensorNoise | No
         transfer=values(sensor, first) - values(sensor, second),
     )
     return receptances, _measured_noise(functions, sensor)
+
+
+def _responses(
+    file: Path, functions: Sequence[Function], nodes: set[str]
+) -> dict[frozenset[str], tuple[Field, Complex]]:
+    """Return the frequency responses by their two nodes; those between `nodes` only once."""
+    found: dict[frozenset[str], tuple[Field, Complex]] = {}
+    for kind, response, reference, frequencies_hz, values in functions:
+        pair = frozenset((response, reference))
+        if kind != FREQUENCY_RESPONSE:
+            continue
+        if pair in found and pair <= nodes:
+            raise BadInput(
+                f"{file.name} has two frequency responses between {response} and {reference}; "
+                "keep one"
+            )
+        found[pair] = (frequencies_hz, values)
+    return found
 
 
 def _require_responses(

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, require_positive
 
+MAX_MODES = 1000
 ASYMMETRY = 1e-9  # largest relative difference between a matrix and its transpose
 
 
@@ -59,7 +60,7 @@ class Structure:
             if vector.shape != (size,) or not np.all(np.isfinite(vector)):
                 raise BadInput(
                     f"{name} must be {size} finite numbers, one for each degree of freedom, got "
-                    f"shape {vector.shape}"
+                    f"{vector.tolist()}"
                 )
             object.__setattr__(self, name, vector)
         if not np.any(self.contact):
@@ -70,12 +71,13 @@ class Structure:
                 f"the mass matrix must be positive definite, its least eigenvalue is "
                 f"{least_mass:.3g} kg; remove degrees of freedom without mass"
             )
-        values = np.linalg.eigvalsh(self.stiffness)
-        if values[0] < -1e-9 * max(abs(values[-1]), 1.0):
-            raise BadInput(
-                f"the stiffness matrix has a negative eigenvalue, {values[0]:.3g} N/m; correct its "
-                "signs"
-            )
+        for name, unit in (("stiffness", "N/m"), ("damping", "N s/m")):
+            values = np.linalg.eigvalsh(getattr(self, name))
+            if values[0] < -1e-9 * max(abs(values[-1]), 1e-3):
+                raise BadInput(
+                    f"the {name} matrix has a negative eigenvalue, {values[0]:.3g} {unit}; correct "
+                    "its signs"
+                )
 
     @classmethod
     def from_modes(
@@ -99,6 +101,11 @@ class Structure:
             for negative frequencies or damping ratios, and as for the class.
         """
         angular = 2.0 * np.pi * np.atleast_1d(np.asarray(frequencies_hz, dtype=float))
+        if angular.size > MAX_MODES or np.size(damping_ratios) not in (1, angular.size):
+            raise BadInput(
+                f"modes need a damping ratio for each of at most {MAX_MODES} frequencies, got "
+                f"{np.size(damping_ratios)} for {angular.size}"
+            )
         ratios = np.broadcast_to(np.asarray(damping_ratios, dtype=float), angular.shape)
         if not (np.all(angular >= 0.0) and np.all(ratios >= 0.0)):
             raise BadInput(

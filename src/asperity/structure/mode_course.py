@@ -1,5 +1,6 @@
 """Mode of a structure that follows the contact, over the contact's stiffness."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,7 +21,7 @@ MIN_CONTACT_SHARE = 0.05  # of the strain energy: modes with less say little abo
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ContactMode:
-    """Mode with the largest share of the contact, over the contact's stiffness.
+    """Mode with the largest mean share of the contact, over the contact's stiffness.
 
     Arrays of shape (n,): `stiffness` of the contact [N/m], increasing; `frequency_hz`;
     `damping_ratio` of the structure alone; `contact_shape` [kg^-1/2].
@@ -64,7 +65,7 @@ class ContactMode:
 
 
 def contact_mode(structure: Structure | Receptances, lowest: float, highest: float) -> ContactMode:
-    """Follow the mode with the largest share of the contact from its largest stiffness downwards.
+    """Return the mode with the largest mean share of the contact between two stiffnesses.
 
     Parameters
     ----------
@@ -73,7 +74,7 @@ def contact_mode(structure: Structure | Receptances, lowest: float, highest: flo
     Raises
     ------
     BadInput
-        if the structure has no mode from 50 Hz to 20 kHz.
+        if the structure has no mode from 50 Hz to 20 kHz that can be followed.
 
     Examples
     --------
@@ -84,30 +85,55 @@ def contact_mode(structure: Structure | Receptances, lowest: float, highest: flo
     '5033 Hz, slope 0.50'
     """
     grid = np.geomspace(lowest, highest, STIFFNESSES)
-    in_band = [
-        mode for mode in _modes(structure, highest) if LOWEST_HZ <= mode.frequency_hz <= HIGHEST_HZ
-    ]
-    if not in_band:
-        raise BadInput(
-            f"the structure has no mode from {LOWEST_HZ:g} to {HIGHEST_HZ:g} Hz with a contact of "
-            f"{1e-6 * highest:.3g} N/um; correct its masses or springs"
+    by_stiffness = [_modes(structure, float(stiffness)) for stiffness in grid]
+    courses = [
+        course
+        for number, mode in enumerate(by_stiffness[-1])
+        if LOWEST_HZ <= mode.frequency_hz <= HIGHEST_HZ
+        and (
+            course := [modes[number] for modes in by_stiffness]
+            if isinstance(structure, Structure)
+            else _followed(by_stiffness, mode, grid)
         )
-    course = [max(in_band, key=lambda mode: mode.contact_share)]
-    for stiffness in grid[-2::-1]:
-        expected = course[-1].frequency_hz
-        modes = _modes(structure, float(stiffness))
-        course.append(min(modes, key=lambda mode: abs(mode.frequency_hz - expected)))
-    course.reverse()
+    ]
+    if not courses:
+        raise BadInput(
+            f"the structure has no mode from {LOWEST_HZ:g} to {HIGHEST_HZ:g} Hz that can be "
+            f"followed over contacts of {1e-6 * lowest:.3g} to {1e-6 * highest:.3g} N/um; correct "
+            "its masses or springs, or measure its receptances over a wider band"
+        )
+    best = max(courses, key=lambda course: np.mean([mode.contact_share for mode in course]))
     frequencies, ratios, shapes = (
-        np.array([getattr(mode, name) for mode in course])
+        np.array([getattr(mode, name) for mode in best])
         for name in ("frequency_hz", "damping_ratio", "contact_shape")
     )
     return ContactMode(
         stiffness=grid,
         frequency_hz=np.maximum.accumulate(frequencies),
         damping_ratio=ratios,
-        contact_shape=shapes,
+        contact_shape=np.abs(shapes),  # eigenvectors have either sign
     )
+
+
+def _followed(
+    by_stiffness: Sequence[Sequence[CoupledMode]], last: CoupledMode, grid: Field
+) -> list[CoupledMode]:
+    """Follow a mode of receptances from the largest stiffness down; empty where it is lost.
+
+    Its frequency falls by at most half of the relative change of the stiffness.
+    """
+    course, largest = [last], 0.5 * float(np.log(grid[1] / grid[0]))
+    for modes in reversed(by_stiffness[:-1]):
+        expected = course[-1].frequency_hz
+        candidates = [
+            mode
+            for mode in modes
+            if -1.05 * largest <= np.log(mode.frequency_hz / expected) <= 0.05 * largest
+        ]
+        if not candidates:
+            return []
+        course.append(min(candidates, key=lambda mode: abs(mode.frequency_hz - expected)))
+    return course[::-1]
 
 
 def _modes(structure: Structure | Receptances, stiffness: float) -> tuple[CoupledMode, ...]:

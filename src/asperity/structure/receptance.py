@@ -8,6 +8,7 @@ Source: R. E. D. Bishop and D. C. Johnson, The Mechanics of Vibration (1960).
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -22,8 +23,9 @@ from asperity.structure.rational import RationalFit, rational_fit
 MIN_FREQUENCIES = 4
 MIN_SHARE = 1e-3  # of the contact in the strain energy of a mode
 MAX_DAMPING = 0.3  # of a mode
+UNDAMPED = 1e-7  # rounding of a damping ratio; with noise, growing modes are none
 SAME_MODE = 1e-4  # relative difference of two roots
-SETTLED, MAX_STEPS = 1e-10, 100
+SETTLED, NEARLY_SETTLED, MAX_STEPS = 1e-10, 1e-5, 50  # relative; the second with noise
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -97,6 +99,17 @@ class Receptances:
         ):
             object.__setattr__(self, name, array)
 
+    @cached_property
+    def fit(self) -> RationalFit:
+        """Rational fit of the approach."""
+        return rational_fit(self.frequencies_hz, self.approach)
+
+    @cached_property
+    def between(self) -> tuple[Field, npt.NDArray[np.complex128]]:
+        """Middles between the frequencies [Hz], and the fitted approach there."""
+        middles = 0.5 * (self.frequencies_hz[1:] + self.frequencies_hz[:-1])
+        return middles, self.fit.values_at(middles)
+
     def response(
         self, spring: npt.NDArray[np.complex128], frequencies_hz: Field
     ) -> npt.NDArray[np.complex128]:
@@ -146,15 +159,16 @@ def receptance_modes(
     contact : returns stiffness and damping of the contact [N/m, N s/m] at a frequency [Hz]
     """
     frequencies_hz = receptances.frequencies_hz
-    fit = rational_fit(frequencies_hz, receptances.approach)
+    fit = receptances.fit
     springs = np.array([_spring(contact, complex(entry)) for entry in fit.support])
     modes: dict[int, CoupledMode] = {}
-    for start in fit.roots_of(1.0 + springs * fit.values):
+    for start in (*fit.roots_with(springs), *_dips(receptances, contact)):
         root = _settled(fit, contact, complex(start))
         if root is None or not frequencies_hz[0] <= root.real <= frequencies_hz[-1]:
             continue
         mode = _mode(receptances, fit, contact, root)
-        if mode.contact_share > MIN_SHARE and abs(root.imag) < MAX_DAMPING * root.real:
+        damped = -UNDAMPED < root.imag / root.real < MAX_DAMPING
+        if mode.contact_share > MIN_SHARE and damped:
             modes[round(math.log(mode.frequency_hz) / SAME_MODE)] = mode
     return tuple(sorted(modes.values(), key=lambda mode: mode.frequency_hz))
 
@@ -181,6 +195,20 @@ def _mode(
     )
 
 
+def _dips(
+    receptances: Receptances, contact: Callable[[float], tuple[float, float]]
+) -> npt.NDArray[np.complex128]:
+    """Return the frequencies with a least |1 + (k + iωc) H| between neighbours, slightly damped.
+
+    With noise the roots of the fit may be too far from those they settle at.
+    """
+    middles, values = receptances.between
+    springs = np.array([_spring(contact, complex(place)) for place in middles])
+    sizes = np.abs(1.0 + springs * values)
+    least = (sizes[1:-1] < sizes[:-2]) & (sizes[1:-1] < sizes[2:])
+    return np.asarray(middles[1:-1][least] * (1.0 + 0.01j), dtype=np.complex128)
+
+
 def _spring(contact: Callable[[float], tuple[float, float]], frequency_hz: complex) -> complex:
     stiffness, damping = contact(frequency_hz.real)
     return stiffness + 2j * math.pi * frequency_hz * damping
@@ -189,13 +217,16 @@ def _spring(contact: Callable[[float], tuple[float, float]], frequency_hz: compl
 def _settled(
     fit: RationalFit, contact: Callable[[float], tuple[float, float]], root: complex
 ) -> complex | None:
-    """Return a root of 1/H + k + iωc by Newton's method; None if it does not settle."""
+    """Return a root of 1 + (k + iωc) H by Newton's method; None if it does not settle."""
     for _ in range(MAX_STEPS):
         if not root.real > 0.0:
             return None
-        value = fit(root)
-        step = (1.0 / value + _spring(contact, root)) / (-fit.slope(root) / value**2)
+        spring = _spring(contact, root)
+        slope = spring * fit.slope(root)
+        if slope == 0.0 or not np.isfinite(slope):
+            return None
+        step = (1.0 + spring * fit(root)) / slope
         root -= step
         if abs(step) < SETTLED * abs(root):
             return root
-    return None
+    return root if abs(step) < NEARLY_SETTLED * abs(root) else None

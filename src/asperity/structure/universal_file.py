@@ -82,6 +82,11 @@ def _receptance(path: Path, record: Record, stated: tuple[float, float] | None) 
             f"{path.name}: the response at {response} is not stated to be a displacement, velocity "
             f"or acceleration; {REMEDY} with its data type"
         )
+    if _whole(record, "orddenom_spec_data_type") != FORCE:
+        raise UnreadableFile(
+            f"{path.name}: the reference at {reference} is not stated to be a force; {REMEDY} with "
+            "its data type"
+        )
     frequencies_hz, values = _sampled(record)
     above = frequencies_hz > 0.0
     sign = np.sign(_whole(record, "rsp_dir") * _whole(record, "ref_dir")) or 1
