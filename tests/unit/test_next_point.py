@@ -84,7 +84,8 @@ def linear(unknown, emulated=0.01):
     missing = np.full_like(crf, np.nan)
     log_force = np.tile(np.log(LOADS), (len(crf), 1))
     return ChannelPrediction(
-        crf, np.full_like(crf, emulated), missing, missing, missing, missing, log_force
+        *(crf, np.full_like(crf, emulated), *(missing,) * 4, log_force),
+        *(missing, missing),
     )
 
 
@@ -182,7 +183,8 @@ def test_sequential_predictive_densities_give_the_joint_likelihood():
     rng = np.random.default_rng(3)
     crf, missing = 8.0 + 0.05 * rng.standard_normal((6, 2)), np.full((6, 2), np.nan)
     prediction = ChannelPrediction(
-        crf, np.full((6, 2), 0.01), missing, missing, missing, missing, np.full((6, 2), 6.0)
+        *(crf, np.full((6, 2), 0.01), *(missing,) * 4, np.full((6, 2), 6.0)),
+        *(missing, missing),
     )
     then = predictive_mixture(prediction, first, "crf").log_density(np.array([np.nan, 7.96]), 2e-3)[
         :, 1

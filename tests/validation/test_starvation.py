@@ -74,6 +74,13 @@ def test_a_line_contact_passes_all_the_oil_that_enters(share):
     assert content[np.argmin(np.abs(starved.grid.x))] == 1.0
 
 
+def test_more_oil_than_a_line_contact_passes_floods_it():
+    parts = contact("paper", **{"grid.cells": [128, 8], "grid.y": [-0.2, 0.2]})
+    flooded = solve_contact(*parts, options=conserving())
+    unit = carried(parts[0], parts[1], central(flooded))
+    assert central(solve_contact(*parts, options=conserving(1.1 * unit))) == central(flooded)
+
+
 def test_much_oil_is_the_flooded_contact(ball, curve):
     *_, flooded = ball
     assert central(curve[20.0]) == pytest.approx(central(flooded), rel=0.005)

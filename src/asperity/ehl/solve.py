@@ -30,7 +30,7 @@ from asperity.ehl.scales import Scales
 from asperity.ehl.strategies.grid_continuation import Progress, Search
 from asperity.ehl.strategies.mixed_search import COARSE_TO_FINE, ROBUST, MixedSearch
 from asperity.ehl.strategies.oil_state import pressures_of
-from asperity.ehl.strategies.starved_inlet import FRONTS, emptied_inlet
+from asperity.ehl.strategies.starved_inlet import FRONTS, emptied_inlet, passes_less
 from asperity.lubricant import Lubricant, require_liquid
 from asperity.surface import Surface
 
@@ -188,7 +188,8 @@ def solve_starved(
     """Solve a conserving contact with an inlet layer; called by `solve_contact`.
 
     The guesses are the neighbouring solution, if there is one, and then the flooded contact with
-    its inlet emptied up to several fronts.
+    its inlet emptied up to several fronts. A line contact that passes less than the layer has
+    nowhere to push the rest: it is flooded.
     """
     began = time.perf_counter()
     assert options.inlet_layer is not None
@@ -203,6 +204,8 @@ def solve_starved(
     solution = None if start is None else solve(options=options, start=start)
     if solution is None or not solution.convergence.converged:
         flooded = solve(options=replace(options, inlet_layer=None))
+        if conditions.endless and passes_less(flooded, options.inlet_layer):
+            return flooded
         for front in FRONTS:
             guess = emptied_inlet(flooded, options.inlet_layer, front)
             solution = solve(options=options, start=guess)

@@ -19,3 +19,10 @@ def emptied_inlet(flooded: ContactSolution, layer: InletLayer, front: float) -> 
     content = np.where(empty, thickness / flooded.gap, flooded.oil.content)
     oil = replace(flooded.oil, content=content, pressure=np.where(empty, 0.0, flooded.oil.pressure))
     return replace(flooded, pressure=np.where(empty, 0.0, flooded.pressure), oil=oil)
+
+
+def passes_less(flooded: ContactSolution, layer: InletLayer) -> bool:
+    """Return whether a flooded contact passes less oil than a layer brings everywhere."""
+    assert flooded.oil is not None
+    passed = flooded.oil.content[-1] * flooded.gap[-1]  # at ambient pressure
+    return bool(np.all(passed <= layer.thickness_at(flooded.grid.y)))
