@@ -57,6 +57,13 @@ def test_the_verdict_depends_on_resolution_and_noise(asp):
     assert "below the noise" in noisy
 
 
+def test_a_sensor_that_does_not_move_sees_nothing(asp):
+    still = HOLDER.replace("sensor = [1.0, 0.0]", "sensor = [0.0, 0.0]")
+    Path("still.toml").write_text(still, "utf-8")
+    out = asp("observe", "case.toml", "--structure", "still.toml", "--quiet")[1]
+    assert out.startswith("This sensor cannot see this contact")
+
+
 def test_without_a_structure_the_mass_is_on_the_contact(asp):
     """Its mode is the contact's own resonance."""
     result = json.loads(asp("observe", "case.toml", "--json")[1])

@@ -11,10 +11,11 @@ import pytest
 from asperity.case import load_case
 from asperity.core.errors import BadInput
 from asperity.coupling import VibrationModel, search_band, structural_resonance
-from asperity.inference import Observation, ObservedSeries, infer_series
+from asperity.inference import Observation, ObservedSeries, infer_series, inference_setting
 from asperity.inference.structure_input import on_single_mass
 from asperity.monitoring import TrackSettings, read_table, track_recordings
 from asperity.paper import Disturbance, RigSettings, papers_contact, simulate_rig, write_rig
+from asperity.results import load_run, solve_case
 from asperity.structure import (
     NamedStructure,
     Receptances,
@@ -181,6 +182,8 @@ def test_recordings_through_a_structure_show_its_modes(tmp_path):
     structure, model = case.structure.structure, case.vibration
     resonance = structural_resonance(case.structure, case.conditions, model)
     assert resonance.band_hz == simulated.band_hz
+    rings = np.array([entry.crf_hz for entry in simulated.recordings]).reshape(4, 2)
+    assert 3.0 < np.sqrt(np.mean(np.diff(rings, axis=1) ** 2) / 2.0) < 45.0  # 15 Hz stated
     k = float(resonance.mode.stiffness_at(first.crf_hz))
     frequencies_hz = np.array([0.9, 1.0, 1.1]) * first.crf_hz
     spring = math.sqrt(k * 0.1) * 2.0 * 0.02
@@ -213,6 +216,28 @@ def test_a_mode_with_little_of_the_contact_gives_no_stage(tmp_path):
     assert all(math.isnan(recording.clr) for recording in track.recordings)
     note = "No wear stage is determined: the contact has 1."
     assert any(entry.startswith(note) for entry in track.notes)
+
+
+def test_a_relative_structure_follows_the_case_into_other_folders(tmp_path):
+    (tmp_path / "holder.toml").write_text(HOLDER, "utf-8")
+    case, simulated = rig(tmp_path, "holder.toml")
+    write_rig(simulated, tmp_path / "rig")
+    assert load_case(tmp_path / "rig" / "rig.toml").structure.name == "a stiff arm"
+    (tmp_path / "runs").mkdir()
+    smooth = case.with_written({"surface": "flat", "vibration": "none"})
+    saved = solve_case(smooth, groups=()).save(tmp_path / "runs" / "run.nc")
+    assert load_run(saved).case.contents.structure == "holder.toml"
+
+
+def test_the_mass_of_the_inference_is_as_uncertain_as_the_structure(inference_case):
+    """An error of the mode's frequency is one of the mass's over the share, twice."""
+    setting = with_structure(formula_setting(), inference_case, "holder.toml")
+    found = inference_setting(setting.case)
+    case = setting.case
+    resonance = structural_resonance(case.structure, case.conditions, case.vibration)
+    (mass,) = (unknown for unknown in found.unknowns if unknown.key == "mass_kg")
+    assert mass.std / mass.mean == pytest.approx(2.0 * 0.05 / resonance.contact_share, rel=1e-6)
+    assert mass.std / mass.mean > 0.1
 
 
 @pytest.fixture(scope="module")

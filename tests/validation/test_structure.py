@@ -565,7 +565,11 @@ def test_receptances_of_a_universal_file(tmp_path, units):
     """Accelerances of a hammer: both bodies and the sensor, along axes of either sign."""
     model, frequencies_hz, flexible = measured_chain()
     angular = 2.0 * math.pi * frequencies_hz
-    nodes = {"first": (1, (11, 3), 1.0), "second": (2, (21, -3), -1.0), "sensor": (0, (30, 1), 1.0)}
+    nodes = {
+        "first": (1, (11, 3), 1.0),
+        "second": (2, (21, -3), -1.0),
+        "sensor": (0, (30, -1), -1.0),
+    }
     scale = 1.0 if units is None else units["length"] / units["force"]
     pairs = {}
     for response, reference in (
@@ -582,6 +586,7 @@ def test_receptances_of_a_universal_file(tmp_path, units):
     loaded = load_structure(tmp_path / "machine.toml")
     expected = model.contact @ flexible @ model.contact
     np.testing.assert_allclose(loaded.structure.approach, expected, rtol=1e-5)
+    # the sensor points along -X: its motion along X has the other sign
     expected = model.sensor @ flexible @ model.contact
     np.testing.assert_allclose(loaded.structure.transfer, expected, rtol=1e-5)
     factor = 1.0 if units is None else 1.0 / units["length"]
