@@ -33,8 +33,16 @@ def test_a_mode_of_the_holder_moves_with_the_contact(asp):
     low, high = result["modes"]
     assert set(low) == {
         *("frequency_hz", "damping_ratio", "contact_share", "contact_stiffness_n_m"),
-        *("frequencies_hz", "damping_ratios", "movement", "shift_per_clr", "amplitude_at_sensor"),
+        *(
+            "frequencies_hz",
+            "damping_ratios",
+            "movement",
+            "shift_per_clr",
+            "amplitude_at_sensor",
+            "noise_at_sensor",
+        ),
     }
+    assert low["noise_at_sensor"] == 1e-6
     assert low["contact_share"] < 0.02
     assert high["contact_share"] > 0.9
     assert high["movement"] > 10.0 * low["movement"]

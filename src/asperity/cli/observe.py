@@ -76,6 +76,7 @@ def _rows(view: "SensorView") -> Block:
             f"{100.0 * observed.movement:.3f}",
             "" if (shift := observed.shift_per_clr) is None else f"{shift:+.3f}",
             "" if (level := observed.amplitude_at_sensor) is None else f"{level:.3g}",
+            "" if (noise := view.noise_at(observed)) is None else f"{noise:.3g}",
         ]
         for observed in view.modes
     ]
@@ -86,6 +87,7 @@ def _rows(view: "SensorView") -> Block:
         "movement [%]",
         "shift per CLR",
         "at sensor [m/s²/√Hz]",
+        "noise",
     ]
     if rows:
         yield from columns(heads, rows)

@@ -124,6 +124,11 @@ class SensorView(Displayed):
             )
         )
 
+    def noise_at(self, observed: ObservedMode) -> float | None:
+        """Return the sensor's noise at a mode [m/s²/√Hz]; None if it is not known."""
+        noise = self.named.noise
+        return None if noise is None else noise.interpolate(observed.mode.frequency_hz)
+
     def verdict(self) -> str:
         """Return one sentence: whether the sensor can see the contact, and by which mode."""
         course = (
@@ -166,7 +171,10 @@ class SensorView(Displayed):
             "visible": bool(self.visible) if len(self.sq) > 1 else None,
             "sq_m": list(self.sq),
             "clr": list(self.clr),
-            "modes": [observed.row() for observed in self.modes],
+            "modes": [
+                {**observed.row(), "noise_at_sensor": self.noise_at(observed)}
+                for observed in self.modes
+            ],
         }
 
 
