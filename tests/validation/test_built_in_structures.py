@@ -134,7 +134,7 @@ def test_one_course_serves_for_all_structures_and_is_drawn():
     assert (responses[:, 1] > 10.0 * responses[:, 0]).all()
     axes = view.plot()
     assert len(axes.lines) == 3
-    assert axes.get_title("left") == "Share of the contact in the modes of a twin-disc rig"
+    assert axes.get_title("left") == "Share of the contact in the modes\nof a twin-disc rig"
     shares = {text.get_text() for text in axes.texts}
     assert f"{100.0 * view.modes[-1].mode.contact_share:.2g} %" in shares
 

@@ -33,7 +33,7 @@ def response_figure(view: SensorView, medium: Medium) -> Figure:
     axes.set(
         xlabel="frequency [Hz]",
         ylabel="sensor over roughness [m/m]",
-        title=f"Share of the contact in the modes of {view.named.name}",
+        title=f"Share of the contact in the modes\nof {view.named.name}",
         ylim=(None, 3.0 * float(responses.max())),
     )
     plain_log_labels(axes)
