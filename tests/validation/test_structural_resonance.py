@@ -14,6 +14,7 @@ from asperity.coupling import VibrationModel, search_band, structural_resonance
 from asperity.inference import Observation, ObservedSeries, infer_series, inference_setting
 from asperity.inference.structure_input import on_single_mass
 from asperity.monitoring import TrackSettings, read_table, track_recordings
+from asperity.monitoring.target import search_target
 from asperity.paper import Disturbance, RigSettings, papers_contact, simulate_rig, write_rig
 from asperity.results import load_run, solve_case
 from asperity.structure import (
@@ -216,6 +217,17 @@ def test_a_mode_with_little_of_the_contact_gives_no_stage(tmp_path):
     assert all(math.isnan(recording.clr) for recording in track.recordings)
     note = "No wear stage is determined: the contact has 1."
     assert any(entry.startswith(note) for entry in track.notes)
+
+
+def test_the_load_share_on_the_spring_of_a_line_contact_is_by_its_own_law(tmp_path):
+    """Without a structure: the ends of the search band are CLR 0.01 and 1, 5 % wider."""
+    (tmp_path / "case.toml").write_text(CONTACT.replace('structure = "STRUCTURE"', ""), "utf-8")
+    case = load_case(tmp_path / "case.toml")
+    target = search_target(case)
+    low, high = target.band_hz[0] / 0.95, target.band_hz[1] / 1.05
+    share = target.load_share(np.array([low, high, np.nan]), np.array([0.1, 0.1, 0.0]))
+    assert share.clr == pytest.approx([0.01, 1.0, np.nan], rel=0.02, nan_ok=True)
+    assert share.interval[0][1] < 1.0
 
 
 def test_a_relative_structure_follows_the_case_into_other_folders(tmp_path):

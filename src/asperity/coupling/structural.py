@@ -15,6 +15,7 @@ from asperity.coupling.spring import loaded_oscillator
 from asperity.structure import MIN_CONTACT_SHARE, ContactMode, NamedStructure, contact_mode
 from asperity.vibration import ContactOscillator
 
+MIN_RANGE = 1.01  # of the stiffness over the load share, from which CRF determines it
 SHARES = 25  # of the load, at which the law is evaluated
 
 
@@ -64,7 +65,12 @@ class StructuralResonance:
         return self.contact_share < MIN_CONTACT_SHARE
 
     def load_share(self, crf_hz: ArrayLike) -> Field:
-        """Return the load share of the asperities at frequencies of the mode, 0.01 to 1."""
+        """Return the load share of the asperities at frequencies of the mode, 0.01 to 1.
+
+        nan for a law by which the stiffness does not depend on it.
+        """
+        if self.stiffness[-1] < MIN_RANGE * self.stiffness[0]:
+            return np.full(np.shape(crf_hz), np.nan)
         stiffness = np.log(self.mode.stiffness_at(crf_hz))
         return np.exp(np.interp(stiffness, np.log(self.stiffness), np.log(self.clr)))
 

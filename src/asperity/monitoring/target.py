@@ -11,7 +11,7 @@ from asperity.core.coverage import NORMAL_FACTOR
 from asperity.core.errors import BadInput, require_positive
 from asperity.coupling import BAND_MARGIN, StructuralResonance, search_band, structural_resonance
 from asperity.paper import papers_case
-from asperity.structure import MIN_CONTACT_SHARE
+from asperity.structure import MIN_CONTACT_SHARE, NamedStructure, Structure
 from asperity.trend import LoadShare, asperity_load_share
 
 SHAFTS = ("shaft_hz", "pinion_hz", "cam_hz", "disc_1_hz")  # shafts with a speed in the case
@@ -53,6 +53,18 @@ class Target:
             "contact; use a sensor and band where it has more (`asperity observe`)."
         )
 
+    @property
+    def _on_its_mass(self) -> StructuralResonance | None:
+        """Resonance of the mass of [vibration] on a spring by another law than the sphere's."""
+        model = None if self.case is None else self.case.vibration
+        if self.case is None or model is None:
+            return None
+        if model.stiffness_law.point_spring or not model.stiffness_law.asperities_alone:
+            return None
+        mass = Structure.single_mass(model.mass)
+        named = NamedStructure(name="the mass of [vibration]", structure=mass, frequency_std=0.0)
+        return structural_resonance(named, self.case.conditions, model)
+
     def load_share(self, crf_hz: Field, crf_std_hz: Field) -> LoadShare | None:
         """Return the load share of the asperities by CRF; None without a responsive model.
 
@@ -60,11 +72,12 @@ class Target:
         """
         if self.full_load_crf_hz is None or self.unresponsive:
             return None
-        if self.structural is None:
+        resonance = self.structural or self._on_its_mass
+        if resonance is None:
             return asperity_load_share(crf_hz, crf_std_hz, self.full_load_crf_hz)
-        half = NORMAL_FACTOR * np.hypot(crf_std_hz, self.structural.frequency_std * crf_hz)
+        half = NORMAL_FACTOR * np.hypot(crf_std_hz, resonance.frequency_std * crf_hz)
         clr, low, high = (
-            np.where(np.isfinite(crf_hz), self.structural.load_share(ends), np.nan)
+            np.where(np.isfinite(crf_hz), resonance.load_share(ends), np.nan)
             for ends in (crf_hz, np.maximum(crf_hz - half, 1.0), crf_hz + half)
         )
         return LoadShare(clr=clr, interval=(low, high))
