@@ -33,4 +33,4 @@ def test_the_table_has_a_row_for_each_point_of_the_study(tmp_path, asp):
     slow, fast = result["rows"]
     assert fast["kxx"] < slow["kxx"]  # the film grows
     code, _, err = asp("machine", str(path), "--stiffness", str(tmp_path / "table.xlsx"))
-    assert (code, "a stiffness table is written as .csv, got table.xlsx" in err) == (2, True)
+    assert (code, "a stiffness table is saved as .csv, got table.xlsx" in err) == (2, True)

@@ -189,6 +189,20 @@ def test_running_roughness_is_starved_too():
     assert starved.state.h_mean < flooded.state.h_mean
 
 
+def test_the_note_calls_a_line_contact_flooded_that_passes_less_than_the_layer():
+    for name, layer, state in (
+        ("paper", "0.9 um", "flooded"),
+        ("paper", "0.7 um", "starved"),
+        ("ball-on-disc", "0.04 um", "starved"),
+        ("ball-on-disc", "0.2 um", "nearly flooded"),
+    ):
+        case = load_case(EXAMPLES / f"{name}.toml").with_written(
+            {"model": "conserving", "inlet.layer": layer}
+        )
+        (note,) = (note for note in case.notes if note.startswith("The inlet layer of"))
+        assert note.endswith(f"the contact is {state}.")
+
+
 def test_a_layer_is_wider_or_narrower_along_the_track():
     layer = InletLayer((1e-7, 3e-7), (-1e-4, 1e-4))
     assert layer.thickness_at(np.array([-1.0, 0.0, 1.0])) == pytest.approx([1e-7, 2e-7, 3e-7])

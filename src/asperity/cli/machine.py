@@ -142,7 +142,7 @@ def _tabulate(chosen: "MachineCase", path: Path, *, as_json: bool, quiet: bool) 
             chosen,
             progress=lambda done, total: display(f"{done} of {total} contacts", done, total),
         )
-    result.write(path)
+    result.save(path)
     show(
         result.verdict(),
         lambda: result.scalars() | {"table": str(path)},

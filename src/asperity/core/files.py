@@ -76,6 +76,21 @@ def write_csv(path: Path, table: "pandas.DataFrame") -> None:
     write_text(path, safe.to_csv(index=False, lineterminator="\n"))
 
 
+def save_csv(path: str | Path, table: "pandas.DataFrame", content: str) -> Path:
+    """Write a table to a .csv file by `write_csv`; `content` names it in the message.
+
+    Raises
+    ------
+    BadInput
+        for another suffix, or a path that is not writable.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".csv":
+        raise BadInput(f"{content} is saved as .csv, got {path.name}; change the suffix")
+    write_csv(path, table)
+    return path
+
+
 def _escape_formula(value: object) -> object:
     return f"'{value}" if isinstance(value, str) and value.startswith(FORMULAS) else value
 

@@ -14,8 +14,8 @@ class InletLayer:
 
     Parameters
     ----------
-    thickness : [m]; one, or one for each place of `y`
-    y : places across rolling [m], increasing; constant beyond the ends. None: uniform
+    thickness : [m], at each place of `y`; a single one is uniform
+    y : places across rolling [m], increasing; constant beyond the ends
 
     Raises
     ------

@@ -18,7 +18,7 @@ import pandas
 from asperity.case import MachineCase
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
-from asperity.core.files import write_csv
+from asperity.core.files import save_csv
 from asperity.machine import BallBearing, CylindricalRollerBearing, MachineContact, TwinDisc
 from asperity.machines.sweep import sweep_points
 from asperity.results import solve_case
@@ -53,19 +53,9 @@ class StiffnessTable:
         """Return the JSON output."""
         return {"verdict": self.verdict(), "rows": self.table.to_dict("records")}
 
-    def write(self, path: str | Path) -> Path:
-        """Write the table as csv; return its path.
-
-        Raises
-        ------
-        BadInput
-            for another suffix, or a path that is not writable.
-        """
-        path = Path(path)
-        if path.suffix.lower() != ".csv":
-            raise BadInput(f"a stiffness table is written as .csv, got {path.name}; change it")
-        write_csv(path, self.table)
-        return path
+    def save(self, path: str | Path) -> Path:
+        """Write the table as .csv; raises as `asperity.core.files.save_csv`."""
+        return save_csv(path, self.table, "a stiffness table")
 
 
 def stiffness_table(

@@ -66,7 +66,10 @@ def _layer_note(
     """Return how much of the flooded film's oil the inlet layer has."""
     flooded, layer = central_film(conditions, lubricant), max(inlet_layer.thickness)
     ratio = layer / flooded
-    state = "nearly flooded" if ratio > NEARLY_FLOODED else "starved"
+    if conditions.endless:  # passes all oil up to the flooded flow
+        state = "flooded" if ratio > 1.0 else "starved"
+    else:
+        state = "nearly flooded" if ratio > NEARLY_FLOODED else "starved"
     film = quantity("h_central_m")
     return (
         f"The inlet layer of {film.text(layer)} is {ratio:.2g} times the oil of the flooded film, "

@@ -11,8 +11,7 @@ import pandas
 from asperity.core.arrays import Field, finite_or_none
 from asperity.core.displayed import Brief
 from asperity.core.documents import JsonObject
-from asperity.core.errors import BadInput
-from asperity.core.files import write_csv
+from asperity.core.files import save_csv
 from asperity.monitoring.alarm import LEVEL_LEAST, ratio_text
 from asperity.monitoring.operating_point import LEVEL, USUAL_OIL, OperatingPoint, conditions_of
 from asperity.monitoring.overalls.acknowledged import acknowledged_rows, row_name
@@ -124,18 +123,8 @@ class OverallTrack(Brief):
         return pandas.DataFrame(self._columns())
 
     def save(self, path: str | Path) -> Path:
-        """Write the table as .csv.
-
-        Raises
-        ------
-        BadInput
-            for another suffix, or a path that is not writable.
-        """
-        path = Path(path)
-        if path.suffix.lower() != ".csv":
-            raise BadInput(f"a judged series is saved as .csv, got {path.name}; change the suffix")
-        write_csv(path, self.table)
-        return path
+        """Write the table as .csv; raises as `save_csv`."""
+        return save_csv(path, self.table, "a judged series")
 
     def _columns(self) -> dict[str, Field | Sequence[str] | Sequence[None]]:
         """Return x, times, values, conditions and states by name."""
