@@ -25,6 +25,10 @@ def test_the_table_has_a_row_for_each_point_of_the_study(tmp_path, asp):
     )
     assert code == 0
     result = json.loads(printed)
+    assert result["verdict"].endswith(" N s/m in 2 rows.")
+    single = asp("machine", str(path), "--stiffness", str(tmp_path / "one.csv"), "--quiet")[1]
+    assert " to " not in single
+    assert single.rstrip().endswith("in 1 row.")
     assert [row["machine.speed"] for row in result["rows"]] == ["1000 r/min", "3000 r/min"]
     assert result["table"] == str(out)
     heading, *rows = out.read_text("utf-8").splitlines()

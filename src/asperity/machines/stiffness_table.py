@@ -43,10 +43,10 @@ class StiffnessTable:
 
     def verdict(self) -> str:
         """Return one sentence: the range of stiffness and damping."""
-        stiffness, damping = 1e-6 * self.table["kxx"], self.table["cxx"]
+        count = len(self.table)
         return (
-            f"Stiffness {stiffness.min():.4g} to {stiffness.max():.4g} N/um and damping "
-            f"{damping.min():.3g} to {damping.max():.3g} N s/m in {len(self.table)} rows."
+            f"Stiffness {_span(1e-6 * self.table['kxx'])} N/um and damping "
+            f"{_span(self.table['cxx'])} N s/m in {count} row{'' if count == 1 else 's'}."
         )
 
     def scalars(self) -> dict[str, object]:
@@ -56,6 +56,12 @@ class StiffnessTable:
     def save(self, path: str | Path) -> Path:
         """Write the table as .csv; raises as `asperity.core.files.save_csv`."""
         return save_csv(path, self.table, "a stiffness table")
+
+
+def _span(values: pandas.Series) -> str:
+    """Return least and greatest value as text; one if they are equal."""
+    low, high = f"{values.min():.3g}", f"{values.max():.3g}"
+    return low if low == high else f"{low} to {high}"
 
 
 def stiffness_table(
