@@ -8,6 +8,7 @@ from asperity.core.errors import BadInput
 from asperity.machines import stiffness_table
 from asperity.results import solve_case
 from asperity.solution import OscillatingContact
+from support.bearings import BALLS
 
 ROLLERS = """
 lubricant = { grade = "VG 68", temperature = "70 degC" }
@@ -20,17 +21,6 @@ machine.pitch_diameter = "46.5 mm"
 machine.clearance = "20 um"
 machine.radial_load = "4 kN"
 machine.speed = "3000 r/min"
-"""
-BALLS = """
-lubricant = { grade = "VG 68", temperature = "70 degC" }
-surface = "flat"
-machine.kind = "ball-bearing"
-machine.balls = 9
-machine.ball_diameter = "9.525 mm"
-machine.pitch_diameter = "46 mm"
-machine.radial_load = "2 kN"
-machine.speed = "3000 r/min"
-grid.cells = [64, 48]
 """
 
 
