@@ -28,38 +28,7 @@ from asperity.structure import (
 )
 from support.emulated import formula_emulator, formula_setting
 
-CONTACT = """
-structure = "STRUCTURE"
-[contact]
-geometry = "line"
-radius = "5.4 mm"
-length = "10 mm"
-load = "500 N"
-entrainment_speed = "1.91 m/s"
-slip = 0.2
-roughness = "standing"
-[material]
-youngs_modulus = ["200 GPa", "200 GPa"]
-poisson_ratio = [0.3, 0.3]
-hardness = "2 GPa"
-[lubricant]
-viscosity = { law = "barus", eta0 = "0.096 Pa s", alpha = "18.2 1/GPa" }
-density = { law = "dowson-higginson", rho0 = "0.88 g/cm^3" }
-rheology = { law = "newtonian" }
-[surface]
-kind = "gaussian"
-sq = "1 um"
-correlation_length = ["20 um", "20 um"]
-seed = 7
-[grid]
-cells = [64, 48]
-x = [-4.5, 1.9]
-y = [-1.6, 1.6]
-[vibration]
-mass = "0.1 kg"
-damping_ratio = 0.02
-stiffness_law = "hertz-line"
-"""
+EXAMPLE = Path(__file__).parents[2] / "examples" / "paper.toml"
 # on a stiff support, so that the contact has 2 % of the strain energy
 STIFF = """
 name = "a stiff arm"
@@ -71,6 +40,19 @@ sensor = [1.0]
 """
 
 HOLDER = STIFF.replace("20.0", "2.0").replace("2e10", "2e8").replace("9000.0", "200.0")
+
+
+def line_contact(folder, structure=None):
+    """Load the paper's contact, standing and on a small grid, from a file in a folder."""
+    changed = {
+        "grid.cells": [64, 48],
+        "contact.roughness": "standing",
+        "vibration.stiffness_law": "hertz-line",
+    }
+    named = "" if structure is None else f'structure = "{structure}"\n'
+    text = load_case(EXAMPLE).with_written(changed).text
+    (folder / "case.toml").write_text(named + text, "utf-8")
+    return load_case(folder / "case.toml")
 
 
 def test_a_mass_on_a_support_and_the_contact():
@@ -160,14 +142,13 @@ def test_the_damping_of_the_followed_mode_is_that_of_the_coupled_mode(name):
 
 def test_a_line_contact_on_the_spring_of_a_sphere_is_refused_in_a_structure():
     named = load_structure("twin-disc")
-    case = load_case(Path(__file__).parents[2] / "examples" / "paper.toml")
+    case = load_case(EXAMPLE)
     with pytest.raises(BadInput, match="'hertz-point' is that of a sphere, far softer than this"):
         structural_resonance(named, case.conditions, case.vibration)
 
 
 def rig(tmp_path, structure, **settings):
-    (tmp_path / "case.toml").write_text(CONTACT.replace("STRUCTURE", structure), "utf-8")
-    case = load_case(tmp_path / "case.toml")
+    case = line_contact(tmp_path, structure)
     return case, simulate_rig(
         RigSettings(samples=4, repeats=2, duration_s=5.0, rate_hz=30e3, **settings),
         disturbance=Disturbance(modes=0, snr_db=25.0),
@@ -221,8 +202,7 @@ def test_a_mode_with_little_of_the_contact_gives_no_stage(tmp_path):
 
 def test_the_load_share_on_the_spring_of_a_line_contact_is_by_its_own_law(tmp_path):
     """Without a structure: the ends of the search band are CLR 0.01 and 1, 5 % wider."""
-    (tmp_path / "case.toml").write_text(CONTACT.replace('structure = "STRUCTURE"', ""), "utf-8")
-    case = load_case(tmp_path / "case.toml")
+    case = line_contact(tmp_path)
     target = search_target(case)
     low, high = target.band_hz[0] / 0.95, target.band_hz[1] / 1.05
     share = target.load_share(np.array([low, high, np.nan]), np.array([0.1, 0.1, 0.0]))
@@ -309,9 +289,7 @@ def test_the_inference_refuses_a_mode_with_little_of_the_contact(inference_case)
 
 
 def test_a_case_names_its_structure(tmp_path):
-    (tmp_path / "case.toml").write_text(CONTACT.replace("STRUCTURE", "paper-rig"), "utf-8")
-    assert load_case(tmp_path / "case.toml").structure.name == "the paper's rig"
-    assert load_case(Path("examples/paper.toml").resolve()).structure is None
-    (tmp_path / "case.toml").write_text(CONTACT.replace("STRUCTURE", "paper-ring"), "utf-8")
+    assert line_contact(tmp_path, "paper-rig").structure.name == "the paper's rig"
+    assert load_case(EXAMPLE).structure is None
     with pytest.raises(BadInput, match="structure 'paper-ring' is not built in; use fzg-gears"):
-        load_case(tmp_path / "case.toml")
+        line_contact(tmp_path, "paper-ring")
