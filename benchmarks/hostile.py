@@ -134,20 +134,21 @@ def watch(
 
 
 def latest(store: Path) -> dict[str, list[tuple[object, ...]]]:
-    """Return the readings and states of each file's last version, one row per sensor."""
+    """Return the readings and states of each file's last version, one row per sensor.
+
+    Rows that a watch held in memory are written sensor by sensor, not in the order of arrival.
+    """
     latest_rows: dict[str, dict[str, tuple[object, ...]]] = {}
     with closing(sqlite3.connect(store)) as connection:
         rows = connection.execute(
             "SELECT file, sensor.name, version, refused, reading, state FROM recording "
             "JOIN sensor ON sensor.id = recording.sensor ORDER BY recording.id"
         ).fetchall()
-    for file, sensor, version, refused, reading, state in rows:
-        of_file = latest_rows.setdefault(Path(file).name, {})
-        if any(version != other for other, *_ in of_file.values()):
-            of_file.clear()
-        of_file[sensor] = (version, sensor, refused, reading, state)
+    last_versions = {Path(row[0]).name: row[2] for row in rows}
+    for file, sensor, version, *outcome in rows:
+        latest_rows.setdefault(Path(file).name, {})[sensor] = (version, sensor, *outcome)
     return {
-        file: [row[1:] for _, row in sorted(of_file.items())]
+        file: [row[1:] for _, row in sorted(of_file.items()) if row[0] == last_versions[file]]
         for file, of_file in latest_rows.items()
     }
 

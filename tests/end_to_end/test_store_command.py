@@ -425,6 +425,28 @@ def test_a_name_that_is_not_utf_8_is_skipped_and_reported(asp):
     assert "is left out: its name is not UTF-8; rename it" in err
 
 
+def test_versions_written_sensor_by_sensor_are_both_read(tmp_path):
+    from benchmarks.hostile import latest
+
+    with closing(sqlite3.connect(tmp_path / "s.db")) as connection:
+        connection.execute("CREATE TABLE sensor (id INTEGER PRIMARY KEY, name)")
+        connection.execute(
+            "CREATE TABLE recording (id INTEGER PRIMARY KEY, sensor, file, version, refused, "
+            "reading, state)"
+        )
+        connection.executemany("INSERT INTO sensor VALUES (?, ?)", [(1, "a"), (2, "b")])
+        connection.executemany(
+            "INSERT INTO recording (sensor, file, version, refused, reading, state) "
+            "VALUES (?, ?, ?, '', ?, '')",
+            [(sensor, "in/r", version, version) for sensor in (1, 2) for version in ("1", "2")]
+            + [(1, "in/q", "1", "1"), (2, "in/q", "1", "1"), (1, "in/q", "2", "2")],
+        )
+        connection.commit()
+    held = latest(tmp_path / "s.db")
+    assert held["r"] == [("a", "", "2", ""), ("b", "", "2", "")]
+    assert held["q"] == [("a", "", "2", "")]
+
+
 def test_a_killed_watch_ends_with_the_store_of_an_uninterrupted_one(monkeypatch):
     """Run `python -m benchmarks.hostile` for seconds: an untidy folder, two watches, one of them
     killed. Two sensors here; `benchmarks.hostile` has one as well.
