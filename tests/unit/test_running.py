@@ -115,7 +115,7 @@ def test_a_start_that_does_not_converge_does_not_change_the_mean(run, monkeypatc
     def of_few_steps(*arguments, options, **more):
         return solve_contact(*arguments, options=replace(options, max_iterations=2), **more)
 
-    monkeypatch.setattr("asperity.transient.motion.solve_contact", of_few_steps)
+    monkeypatch.setattr("asperity.transient.time_step.solve_contact", of_few_steps)
     approximate = solve_case(run.case, surfaces=2)
     assert approximate.converged
     assert approximate.running.failed == 0
@@ -168,7 +168,7 @@ def test_a_passage_from_a_start_that_does_not_converge_begins_one_earlier(monkey
         starts.append(contact[2])
         return solve_contact(*contact, options=replace(options, max_iterations=2), **more)
 
-    monkeypatch.setattr("asperity.transient.motion.solve_contact", of_few_steps)
+    monkeypatch.setattr("asperity.transient.time_step.solve_contact", of_few_steps)
     found = solve_passage(case.conditions, case.lubricant, surfaces, options=case.options)
     assert len(starts) == 2  # one passage before, then two
     assert not np.allclose(starts[0].heights, starts[1].heights)

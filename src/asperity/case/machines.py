@@ -9,8 +9,17 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
 import tomli_w
-from pydantic import BeforeValidator, PlainValidator
+from pydantic import PlainValidator
 
+from asperity.case.bearing_sections import (
+    Angle,
+    BallBearingSection,
+    CylindricalRollerBearingSection,
+    FourPointBearingSection,
+    NeedleBearingSection,
+    Rotation,
+    TaperedRollerBearingSection,
+)
 from asperity.case.case import Case
 from asperity.case.materials import MaterialSection
 from asperity.case.messages import Section, choose, parse_section
@@ -42,28 +51,21 @@ from asperity.machine import (
     CatalogueBearing,
     CylindricalRollerBearing,
     FlatCam,
+    FourPointBearing,
     HelicalGear,
     Machine,
     MachineContact,
+    NeedleRollerBearing,
     RollerCam,
-    RollerProfile,
     SpurGear,
+    TaperedRollerBearing,
     TwinDisc,
     catalogue_bearing,
 )
 from asperity.surface import read_table
 
-Rotation: TypeAlias = Annotated[float, amount_in("rad/s")]
 RotationOrNone: TypeAlias = Annotated[float, amount_in("rad/s", 0.0)]
-Angle: TypeAlias = Annotated[float, amount_in("rad")]
-AnyLength: TypeAlias = Annotated[float, amount_in("m", -math.inf)]
-ForceOrNone: TypeAlias = Annotated[float, amount_in("N", 0.0)]
-AngleOrNone: TypeAlias = Annotated[float, amount_in("rad", 0.0)]
 LengthPair: TypeAlias = Annotated[tuple[Length, Length], PAIRED]
-Tilt: TypeAlias = Annotated[
-    Annotated[float, amount_in("rad", -math.inf)] | None,
-    BeforeValidator(lambda value: None if value == "free" else value),
-]
 MACHINE_TABLES = ("machine", "rating", "study")  # not in the case of a contact
 OF_ALL_CONTACTS = ("roughness",)  # keys of [contact] beside a [machine]
 DIGITS = 10  # of the values of a derived contact
@@ -89,36 +91,6 @@ class HelicalGearSection(SpurGearSection):
 
     kind: Literal["helical-gear"]  # type: ignore[assignment]
     helix_angle: Angle
-
-
-class CylindricalRollerBearingSection(Section):
-    """[machine] kind = "cylindrical-roller-bearing"."""
-
-    kind: Literal["cylindrical-roller-bearing"]
-    rollers: Count
-    roller_diameter: Length
-    roller_length: Length
-    pitch_diameter: Length
-    clearance: AnyLength = default_amount(0.0, "um")
-    radial_load: ForceOrNone
-    speed: Rotation
-    profile: RollerProfile = "straight"
-
-
-class BallBearingSection(Section):
-    """[machine] kind = "ball-bearing"."""
-
-    kind: Literal["ball-bearing"]
-    balls: Count
-    ball_diameter: Length
-    pitch_diameter: Length
-    contact_angle: AngleOrNone = default_amount(0.0, "deg")
-    osculation: Annotated[tuple[Number, Number], PAIRED] = (0.52, 0.53)
-    clearance: AnyLength = default_amount(0.0, "um")
-    radial_load: ForceOrNone = default_amount(0.0, "N")
-    axial_load: ForceOrNone = default_amount(0.0, "N")
-    tilt: Tilt = default_amount(0.0, "mrad")
-    speed: Rotation
 
 
 class TwinDiscSection(Section):
@@ -161,7 +133,10 @@ MACHINES: dict[str, tuple[type[Section], type[Machine]]] = {
     "spur-gear": (SpurGearSection, SpurGear),
     "helical-gear": (HelicalGearSection, HelicalGear),
     "cylindrical-roller-bearing": (CylindricalRollerBearingSection, CylindricalRollerBearing),
+    "needle-bearing": (NeedleBearingSection, NeedleRollerBearing),
+    "tapered-roller-bearing": (TaperedRollerBearingSection, TaperedRollerBearing),
     "ball-bearing": (BallBearingSection, BallBearing),
+    "four-point-bearing": (FourPointBearingSection, FourPointBearing),
     "twin-disc": (TwinDiscSection, TwinDisc),
     "cam-flat": (FlatCamSection, FlatCam),
     "cam-roller": (RollerCamSection, RollerCam),

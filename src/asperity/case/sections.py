@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, PlainValidator, Strict, field_validator, model_validator
 
+from asperity.case.cycle import CycleSection, parse_cycle
 from asperity.case.infer import InferSection, parse_infer
 from asperity.case.laws import LubricantSection, ThermalSection
 from asperity.case.lubricant import SheetSection, parse_lubricant
@@ -166,6 +167,7 @@ class CaseFile(Section):
     motion: Annotated[MotionSection | None, OPTIONAL] = None
     wear: Annotated[WearSection | None, OPTIONAL] = None
     infer: Annotated[InferSection | None, PlainValidator(parse_infer)] = None
+    cycle: Annotated[CycleSection | None, PlainValidator(parse_cycle)] = None
 
     def options(self) -> Options:
         """Return the solver options."""

@@ -40,7 +40,7 @@ from asperity.core.quantities import mark_rolling, quantity
 
 if TYPE_CHECKING:
     from asperity.case import Case
-    from asperity.simulation import WearHistory, WearProgress
+    from asperity.simulation import LiftOffChange, SpeedShare, WearHistory, WearProgress
     from asperity.surface import MeasuredSurface
     from asperity.wear import WearFit
 
@@ -72,6 +72,12 @@ BODY_COLUMNS = (
 PathArgument = Annotated[
     Path | None,
     typer.Argument(metavar="CASE.toml", help="Case, with [wear] for how it wears."),
+]
+LiftOffOption = Annotated[
+    bool,
+    typer.Option(
+        "--lift-off", help="Also find the speed at which the asperities lift off, before and after."
+    ),
 ]
 HoursOption = Annotated[float | None, typer.Option(metavar="H", help="Hours of running.")]
 FitOption = Annotated[
@@ -106,6 +112,7 @@ def wear(
     surface: SurfaceFile = None,
     overrides: Overrides = None,
     snapshot: StandingRoughness = False,
+    lift_off: LiftOffOption = False,
     out: OutFolder = None,
     workers: Workers = None,
     page: Page = None,
@@ -147,17 +154,31 @@ def wear(
     require_page(page, requested=opened)
     chosen = chosen_case(path, overrides, surface, snapshot=snapshot)
     history = _simulate(chosen, path.name, hours, out, workers or cores(), quiet=quiet)
+    change = _lift_off(history, path.name, quiet=quiet) if lift_off else None
     if page is not None:
-        report.write_wear_report(history, page)
-    _show(history, page, as_json=as_json, quiet=quiet)
+        report.write_wear_report(history, page, lift_off=change)
+    _show(history, change, page, as_json=as_json, quiet=quiet)
     open_page(page, requested=opened)
 
 
-def _show(history: "WearHistory", page: Path | None, *, as_json: bool, quiet: bool) -> None:
+def _show(
+    history: "WearHistory",
+    change: "LiftOffChange | None",
+    page: Path | None,
+    *,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    verdicts = [history.verdict(), *([] if change is None else [change.verdict()])]
     show(
-        history.verdict(),
-        lambda: {**history.scalars(), "report": None if page is None else str(page)},
-        _contact(history),
+        verdicts,
+        lambda: {
+            **history.scalars(),
+            **({} if change is None else change.scalars()),
+            "verdict": " ".join(verdicts),
+            "report": None if page is None else str(page),
+        },
+        _contact(history, change),
         _bodies(history),
         table([], history.notes),
         []
@@ -184,6 +205,18 @@ def _simulate(
             )
 
         return simulation.run_wear(chosen, hours=hours, out=out, workers=workers, progress=jump)
+
+
+def _lift_off(history: "WearHistory", label: str, *, quiet: bool) -> "LiftOffChange":
+    with progress(label, "lift-off speed ...", quiet=quiet) as display:
+
+        def solved(speed: float, share: "SpeedShare") -> None:
+            display(
+                f"lift-off speed: {quantity('clr').named(share.clr)} at "
+                f"{quantity('entrainment_speed_m_s').text(speed)}"
+            )
+
+        return history.lift_off(solved)
 
 
 def _amount(option: str, unit: str, text: str | None) -> float | None:
@@ -243,7 +276,7 @@ def _fitted(fitted: "WearFit") -> Block:
     yield from table(rows, fitted.notes)
 
 
-def _contact(history: "WearHistory") -> Block:
+def _contact(history: "WearHistory", change: "LiftOffChange | None") -> Block:
     """Return the initial and final values of the composite surface and the contact."""
     rolling = history.case.conditions.sliding_speed == 0.0
     first, last = (mark_rolling(history.printed_row(row), rolling=rolling) for row in (0, -1))
@@ -251,6 +284,9 @@ def _contact(history: "WearHistory") -> Block:
         (entry.title, entry.number(first[entry.key]), entry.text_in(last))
         for entry in map(quantity, CONTACT)
     ]
+    if change is not None:
+        entry = quantity("lift_off_speed_m_s")
+        rows.append((entry.title, entry.number(change.before.speed), change.after.text))
     return columns(["", "new", f"after {history.hours:.4g} h"], rows, left=1)
 
 

@@ -3,6 +3,8 @@ from .cam import Cam as Cam
 from .cam import CamPoint as CamPoint
 from .cam import FlatCam as FlatCam
 from .cam import RollerCam as RollerCam
+from .cycles import MachineCycle as MachineCycle
+from .cycles import machine_cycle as machine_cycle
 from .designations import LOAD_PER_LIMIT as LOAD_PER_LIMIT
 from .designations import CatalogueBearing as CatalogueBearing
 from .designations import catalogue_bearing as catalogue_bearing
@@ -10,10 +12,14 @@ from .designations import catalogue_bearings as catalogue_bearings
 from .discs import TwinDisc as TwinDisc
 from .element import Machine as Machine
 from .element import MachineContact as MachineContact
+from .four_point import FourPointBearing as FourPointBearing
 from .gear import PathPoint as PathPoint
 from .gear import SpurGear as SpurGear
 from .helical import HelicalGear as HelicalGear
 from .lift import LiftLaw as LiftLaw
+from .needle import NeedleRollerBearing as NeedleRollerBearing
+from .needle import RollerGuidance as RollerGuidance
 from .roller import CylindricalRollerBearing as CylindricalRollerBearing
 from .roller import RollerProfile as RollerProfile
 from .rolling import RollingKinematics as RollingKinematics
+from .tapered import TaperedRollerBearing as TaperedRollerBearing

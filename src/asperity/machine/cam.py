@@ -1,6 +1,6 @@
 """Cams with flat-faced or roller follower: contacts from the nose to the base circle.
 
-The lift is harmonic or a table; each angle is treated as a steady contact.
+The lift is harmonic or a table. `machine.cycles` has the whole revolution.
 """
 
 import math
@@ -109,9 +109,13 @@ class Cam(ABC):
         inertia = self.follower_mass * self.speed**2 * self._lift_bend(angle)
         return self.spring_load + self.spring_rate * self.lift_at(angle) + inertia
 
-    @abstractmethod
-    def contacts(self, pair: ElasticPair) -> tuple[MachineContact, ...]:
+    def contacts(self, pair: ElasticPair) -> tuple[MachineContact, ...]:  # noqa: ARG002 (rigid valve train)
         """Return the contacts at `angles`."""
+        return tuple(self.contact(angle) for angle in self.angles)
+
+    @abstractmethod
+    def contact(self, angle: float) -> MachineContact:
+        """Return the contact at an angle from the nose [rad], also on the base circle."""
 
     @property
     def frequencies(self) -> dict[str, float]:
@@ -121,7 +125,10 @@ class Cam(ABC):
     def notes(self, pair: ElasticPair) -> tuple[str, ...]:
         """Return the limits of the model, and angles of opposing speeds and no entrainment."""
         contacts = self.contacts(pair)
-        notes = ["Each angle is treated as steady; squeeze and film history are not covered."]
+        notes = [
+            "Each angle is treated as steady; `asperity cycle` solves the revolution in time, with "
+            "squeeze."
+        ]
         if isinstance(self.law, TabulatedLift):
             notes.append(
                 f"The table of {len(self.law.table)} lifts is smoothed by "
@@ -173,24 +180,21 @@ class FlatCam(Cam):
         """Return the radius of curvature r_b + s + s'' [m]."""
         return self.base_radius + self.lift_at(angle) + self._lift_bend(angle)
 
-    def contacts(self, pair: ElasticPair) -> tuple[MachineContact, ...]:  # noqa: ARG002 (rigid valve train)
-        """Return the contacts at `angles`: u1 = ω ρ, u2 = ω s''."""
-        return tuple(
-            MachineContact(
-                name=f"{math.degrees(angle):.4g} deg from the nose",
-                bodies=("cam", "follower"),
-                position=angle,
-                load=self.follower_force(angle),
-                geometry="line",
-                radius=self.radius_at(angle),
-                length=self.width,
-                surface_speeds=(
-                    self.speed * self.radius_at(angle),
-                    self.speed * self._lift_bend(angle),
-                ),
-                overrolling_hz=(rotation_hz(self.speed), rotation_hz(self.speed)),
-            )
-            for angle in self.angles
+    def contact(self, angle: float) -> MachineContact:
+        """Return the contact at an angle [rad]: u1 = ω ρ, u2 = ω s''."""
+        return MachineContact(
+            name=f"{math.degrees(angle):.4g} deg from the nose",
+            bodies=("cam", "follower"),
+            position=angle,
+            load=self.follower_force(angle),
+            geometry="line",
+            radius=self.radius_at(angle),
+            length=self.width,
+            surface_speeds=(
+                self.speed * self.radius_at(angle),
+                self.speed * self._lift_bend(angle),
+            ),
+            overrolling_hz=(rotation_hz(self.speed), rotation_hz(self.speed)),
         )
 
     def title(self) -> str:
@@ -267,33 +271,29 @@ class RollerCam(Cam):
             reach, self._lift_slope(angle), self._lift_bend(angle), self.roller_radius
         )
 
-    def contacts(self, pair: ElasticPair) -> tuple[MachineContact, ...]:  # noqa: ARG002 (rigid valve train)
-        """Return the contacts at `angles`.
+    def contact(self, angle: float) -> MachineContact:
+        """Return the contact at an angle [rad].
 
         1/R = 1/ρ + 1/r, F = follower force/cos φ, u1 = ω times the path; slip changes only u2.
         """
-        contacts = []
-        for angle in self.angles:
-            point = self.point_at(angle)
-            curvature = 1.0 / self.roller_radius + (
-                0.0 if math.isinf(point.cam_radius) else 1.0 / point.cam_radius
-            )
-            speed = self.speed * point.path
-            contact = MachineContact(
-                name=f"{math.degrees(angle):.4g} deg from the nose",
-                bodies=("cam", "roller"),
-                position=angle,
-                load=self.follower_force(angle) / math.cos(point.pressure_angle),
-                geometry="line",
-                radius=1.0 / curvature,
-                length=self.width,
-                surface_speeds=(speed, self._speed_ratio * speed),
-                overrolling_hz=(rotation_hz(self.speed), self.frequencies["roller_hz"]),
-            )
-            contacts.append(contact)
-        return tuple(contacts)
+        point = self.point_at(angle)
+        curvature = 1.0 / self.roller_radius + (
+            0.0 if math.isinf(point.cam_radius) else 1.0 / point.cam_radius
+        )
+        speed = self.speed * point.path
+        return MachineContact(
+            name=f"{math.degrees(angle):.4g} deg from the nose",
+            bodies=("cam", "roller"),
+            position=angle,
+            load=self.follower_force(angle) / math.cos(point.pressure_angle),
+            geometry="line",
+            radius=1.0 / curvature,
+            length=self.width,
+            surface_speeds=(speed, self._speed_ratio * speed),
+            overrolling_hz=(rotation_hz(self.speed), self.frequencies["roller_hz"]),
+        )
 
-    @property
+    @cached_property
     def frequencies(self) -> dict[str, float]:
         """Rotational frequencies of the cam, and of the roller averaged over a cam turn [Hz]."""
         first, last = self.law.ends

@@ -1,7 +1,8 @@
 """Cylindrical roller bearing under radial load: load zone and sliced rollers (ISO 16281).
 
-Rings are rigid and parallel. The stiffness of ISO 16281 holds for steel and both contacts of a
-roller in series. Ribs, misalignment and edge stress of roller ends are not modelled.
+`SlicedRoller` and `roller_contacts` serve all roller bearings. Rings are rigid and parallel. The
+stiffness of ISO 16281 holds for steel and both contacts of a roller in series. Ribs, misalignment
+and edge stress of roller ends are not modelled.
 """
 
 import math
@@ -30,6 +31,66 @@ EXPONENT = 10.0 / 9.0  # load of a line contact as a power of its deflection
 STIFFNESS = 35948.0  # N/mm^(10/9) at an effective length of 1 mm, scales with L^(8/9) (ISO 16281)
 STEEL = 226.4e9, 0.05  # E' of the stiffness [Pa], and relative tolerance
 MAX_CLEARANCE = 0.05  # over the roller's diameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlicedRoller:
+    """Roller between two steel raceways, by slices (ISO 16281).
+
+    Parameters
+    ----------
+    diameter, length : of the roller [m]; the length without end radii and undercuts
+    profile : "straight", or "iso" for the logarithmic profile of ISO 16281
+    slices : number of slices
+    """
+
+    diameter: float
+    length: float
+    profile: RollerProfile = "straight"
+    slices: int = SLICES
+
+    def __post_init__(self) -> None:
+        require_positive("roller_length", self.length, "m")
+        require_choice("profile", self.profile, get_args(RollerProfile))
+        if self.slices < SLICES:
+            raise BadInput(
+                f"slices must be at least {SLICES}, as required by ISO 16281, got {self.slices}; "
+                "use more slices"
+            )
+
+    @cached_property
+    def centres(self) -> Field:
+        """Centres of the slices along the roller, from its middle [m]."""
+        return self.length * ((np.arange(self.slices) + 0.5) / self.slices - 0.5)
+
+    @cached_property
+    def drop(self) -> Field:
+        """Profile drop of one contact at the centres of the slices [m]."""
+        if self.profile == "straight":
+            return np.zeros(self.slices)
+        return iso_profile(self.centres, self.length, self.diameter)
+
+    def loads(self, approach: Field) -> Field:
+        """Return the loads of the slices [N] for approaches of the raceways [m].
+
+        Shape (rollers, slices); c_L δ^(10/9)/n_s with the deflection δ of both contacts.
+        """
+        elastic = 1e3 * self._deflections(approach)  # mm
+        stiffness = STIFFNESS * (1e3 * self.length) ** (8.0 / 9.0) / self.slices
+        return np.asarray(stiffness * elastic**EXPONENT)
+
+    def slopes(self, approach: Field) -> Field:
+        """Return d(load)/d(approach) of the rollers [N/m], shape (rollers,)."""
+        elastic, loads = self._deflections(approach), self.loads(approach)
+        slopes = np.divide(loads, elastic, out=np.zeros_like(loads), where=elastic > 0.0)
+        return np.asarray(EXPONENT * slopes.sum(axis=1))
+
+    def energy(self, approach: Field) -> float:
+        """Return the elastic energy of all rollers [J]."""
+        return float(np.sum(self.loads(approach) * self._deflections(approach)) / (EXPONENT + 1.0))
+
+    def _deflections(self, approach: Field) -> Field:
+        return np.asarray(np.maximum(approach[:, None] - 2.0 * self.drop, 0.0))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,6 +132,7 @@ class CylindricalRollerBearing:
     """
 
     place: ClassVar[str] = "cycle_angle"
+    type_name: ClassVar[str] = "Cylindrical roller bearing"
 
     rollers: int
     roller_diameter: float
@@ -83,15 +145,9 @@ class CylindricalRollerBearing:
     slices: int = SLICES
 
     def __post_init__(self) -> None:
-        require_positive("roller_length", self.roller_length, "m")
-        require_choice("profile", self.profile, get_args(RollerProfile))
+        _ = self._roller  # checks length, profile and slices
         _ = self.kinematics  # checks the number of rollers, diameters and speed
         require_load(self.radial_load, self.clearance, self.roller_diameter, "roller")
-        if self.slices < SLICES:
-            raise BadInput(
-                f"slices must be at least {SLICES}, as required by ISO 16281, got {self.slices}; "
-                "use more slices"
-            )
 
     @cached_property
     def kinematics(self) -> RollingKinematics:
@@ -109,16 +165,14 @@ class CylindricalRollerBearing:
         return 2.0 * np.pi * np.arange(self.rollers) / self.rollers
 
     @cached_property
-    def slice_centres(self) -> Field:
-        """Centres of the slices along a roller, from its middle [m]."""
-        return self.roller_length * ((np.arange(self.slices) + 0.5) / self.slices - 0.5)
-
-    @cached_property
-    def drop(self) -> Field:
-        """Profile drop of one contact at the centres of the slices [m]."""
-        if self.profile == "straight":
-            return np.zeros(self.slices)
-        return iso_profile(self.slice_centres, self.roller_length, self.roller_diameter)
+    def _roller(self) -> SlicedRoller:
+        """A roller by slices."""
+        return SlicedRoller(
+            diameter=self.roller_diameter,
+            length=self.roller_length,
+            profile=self.profile,
+            slices=self.slices,
+        )
 
     @cached_property
     def shift(self) -> float:
@@ -141,11 +195,8 @@ class CylindricalRollerBearing:
 
     def stiffness_matrix(self, pair: ElasticPair) -> Field:  # noqa: ARG002 (ISO's stiffness of steel)
         """Return d(force)/d(shift) of the inner ring along the load [N/m], shape (1, 1)."""
-        approach = np.cos(self.angles) * self.shift - self.clearance / 2.0
-        elastic = np.maximum(approach[:, None] - 2.0 * self.drop, 0.0)
-        loads = self.slice_loads
-        slopes = EXPONENT * np.divide(loads, elastic, out=np.zeros_like(loads), where=elastic > 0.0)
-        return np.array([[float(np.cos(self.angles) ** 2 @ slopes.sum(axis=1))]])
+        slopes = self._roller.slopes(self._approaches(self.shift))
+        return np.array([[float(np.cos(self.angles) ** 2 @ slopes)]])
 
     @property
     def loads(self) -> Field:
@@ -153,33 +204,26 @@ class CylindricalRollerBearing:
         loads: Field = self.slice_loads.sum(axis=1)
         return loads
 
-    def contacts(self, pair: ElasticPair) -> tuple[MachineContact, ...]:  # noqa: ARG002 (ISO's stiffness of steel)
+    def contacts(self, pair: ElasticPair) -> tuple[MachineContact, ...]:
         """Return both contacts of each loaded roller."""
-        contacts = []
-        kinematics = self.kinematics
-        per_length = self.slices / self.roller_length
-        for number, (angle, slices) in enumerate(zip(self.angles, self.slice_loads, strict=True)):
-            for ring, radius, passages in zip(
-                ("inner ring", "outer ring"),
-                kinematics.radii,
-                kinematics.overrolling_hz,
-                strict=True,
-            ):
-                if slices.sum() > 0.0:
-                    contact = MachineContact(
-                        name=f"roller {number}, {ring}",
-                        bodies=(ring, "roller"),
-                        position=float(angle),
-                        load=float(slices.sum()),
-                        geometry="line",
-                        radius=radius,
-                        length=self.roller_length,
-                        surface_speeds=(kinematics.surface_speed, kinematics.surface_speed),
-                        overrolling_hz=passages,
-                        max_line_load=float(slices.max()) * per_length,
-                    )
-                    contacts.append(contact)
-        return tuple(contacts)
+        return self.contacts_at(self.angles, pair)
+
+    def contacts_at(self, positions: Field, pair: ElasticPair) -> tuple[MachineContact, ...]:  # noqa: ARG002 (ISO's stiffness of steel)
+        """Return both contacts of loaded rollers at some positions from the load [rad]."""
+        approaches = self.shift * np.cos(positions) - self.clearance / 2.0
+        slice_loads = self._roller.loads(approaches)
+        return roller_contacts(
+            positions,
+            (slice_loads, slice_loads),
+            self.kinematics.radii,
+            self.kinematics,
+            self.roller_length,
+        )
+
+    @property
+    def cage_speed(self) -> float:
+        """Speed of the cage [rad/s]."""
+        return self.kinematics.cage_speed
 
     @property
     def frequencies(self) -> dict[str, float]:
@@ -189,28 +233,76 @@ class CylindricalRollerBearing:
     def notes(self, pair: ElasticPair) -> tuple[str, ...]:
         """Return the limits of the model."""
         mass = STEEL_DENSITY * math.pi / 4.0 * self.roller_diameter**2 * self.roller_length
-        notes = [
-            "Rings are rigid and parallel; ribs, misalignment and the stress at roller ends are "
-            "not covered."
-        ]
-        if abs(pair.effective_modulus / STEEL[0] - 1.0) > STEEL[1]:
-            notes.append(
-                "The load zone is that of steel rollers and rings (ISO 16281), regardless of "
-                "[material]."
-            )
         centrifugal = centrifugal_notes(self.kinematics.centrifugal_load(mass), self.contacts(pair))
-        return (*notes, *load_zone_notes(self.loads.tolist(), "roller"), *centrifugal)
+        return (
+            "Rings are rigid and parallel; ribs, misalignment and the stress at roller ends are "
+            "not covered.",
+            *steel_notes(pair),
+            *load_zone_notes(self.loads.tolist(), "roller"),
+            *centrifugal,
+        )
 
     def title(self) -> str:
         """Return a short description with the number of loaded rollers."""
         loaded = int(np.sum(self.loads > 0.0))
-        return f"Cylindrical roller bearing, {loaded} of {self.rollers} rollers loaded"
+        return f"{self.type_name}, {loaded} of {self.rollers} rollers loaded"
+
+    def _approaches(self, shift: float) -> Field:
+        return np.asarray(shift * np.cos(self.angles) - self.clearance / 2.0)
 
     def _slice_loads(self, shift: float) -> Field:
-        approach = 1e3 * (shift * np.cos(self.angles) - self.clearance / 2.0)  # mm
-        elastic = np.maximum(approach[:, None] - 2e3 * self.drop, 0.0)
-        stiffness = STIFFNESS * (1e3 * self.roller_length) ** (8.0 / 9.0) / self.slices
-        return np.asarray(stiffness * elastic**EXPONENT)
+        return self._roller.loads(self._approaches(shift))
+
+
+def roller_contacts(
+    positions: Field,
+    slice_loads: tuple[Field, Field],
+    radii: tuple[float, float],
+    kinematics: RollingKinematics,
+    length: float,
+) -> tuple[MachineContact, ...]:
+    """Return both contacts of each loaded roller, solved for its most loaded slice.
+
+    Parameters
+    ----------
+    positions : of the rollers, from the direction of the load [rad]
+    slice_loads : at the inner and the outer ring [N], each of shape (rollers, slices)
+    radii : effective radii at the inner and the outer ring [m]
+    kinematics : of the bearing
+    length : of the rollers [m]
+    """
+    contacts = []
+    per_length = slice_loads[0].shape[1] / length
+    rings = "inner ring", "outer ring"
+    for number, position in enumerate(positions):
+        for ring, radius, loads, passages in zip(
+            rings, radii, slice_loads, kinematics.overrolling_hz, strict=True
+        ):
+            slices = loads[number]
+            if slices.sum() > 0.0:
+                contact = MachineContact(
+                    name=f"roller {number}, {ring}",
+                    bodies=(ring, "roller"),
+                    position=float(position),
+                    load=float(slices.sum()),
+                    geometry="line",
+                    radius=radius,
+                    length=length,
+                    surface_speeds=(kinematics.surface_speed, kinematics.surface_speed),
+                    overrolling_hz=passages,
+                    max_line_load=float(slices.max()) * per_length,
+                )
+                contacts.append(contact)
+    return tuple(contacts)
+
+
+def steel_notes(pair: ElasticPair) -> tuple[str, ...]:
+    """Return a note that the stiffness is that of steel, for other materials."""
+    if abs(pair.effective_modulus / STEEL[0] - 1.0) <= STEEL[1]:
+        return ()
+    return (
+        "The load zone is that of steel rollers and rings (ISO 16281), regardless of [material].",
+    )
 
 
 def iso_profile(along: Field, length: float, diameter: float) -> Field:

@@ -3,6 +3,8 @@ from .base import Picture as Picture
 from .base import write_exhibits as write_exhibits
 from .benchmark import benchmark_figure as benchmark_figure
 from .benchmark import experiment_figure as experiment_figure
+from .cycle.exhibits import cycle_exhibits as cycle_exhibits
+from .cycle.page import write_cycle_report as write_cycle_report
 from .inference.page import inference_exhibits as inference_exhibits
 from .inference.page import write_inference_report as write_inference_report
 from .machine.page import machine_exhibits as machine_exhibits

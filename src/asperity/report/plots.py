@@ -14,6 +14,7 @@ from asperity.ehl import ContactSolution, ContactState
 from asperity.machines import MachineResult
 from asperity.monitoring import Track
 from asperity.report.base import Exhibit
+from asperity.report.cycle.exhibits import over_cycle
 from asperity.report.drawing import display, group_values, name_axes
 from asperity.report.machine.contact_path import along_path
 from asperity.report.machine.sketch import machine_sketch
@@ -25,7 +26,7 @@ from asperity.report.style import BLUE, ON_PAGE, Medium
 from asperity.report.track.exhibits import amplitude, levels, trend
 from asperity.report.wear.exhibits import curves as wear_curves
 from asperity.results import Run, SensorView
-from asperity.simulation import History, WearHistory
+from asperity.simulation import CycleResult, History, WearHistory
 from asperity.solution import contact_state
 from asperity.study import StudyOverview, StudyResult
 from asperity.surface import Surface
@@ -95,6 +96,11 @@ def _(history: WearHistory) -> Mapping[str, Draw]:
 @drawings_of.register
 def _(history: History) -> Mapping[str, Draw]:
     return _exhibits(motion_curves(history))
+
+
+@drawings_of.register
+def _(result: CycleResult) -> Mapping[str, Draw]:
+    return _exhibits(over_cycle(result))
 
 
 @drawings_of.register

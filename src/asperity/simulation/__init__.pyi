@@ -1,3 +1,9 @@
+from .cycle.machine import machine_contact_cycle as machine_contact_cycle
+from .cycle.result import CycleInstant as CycleInstant
+from .cycle.result import CycleResult as CycleResult
+from .cycle.result import CycleTotal as CycleTotal
+from .cycle.run import CycleProgress as CycleProgress
+from .cycle.run import solve_cycle as solve_cycle
 from .motion.history import History as History
 from .motion.history import MotionFrame as MotionFrame
 from .motion.run import HistoryProgress as HistoryProgress
@@ -13,6 +19,14 @@ from .wear.frames import WearFrame as WearFrame
 from .wear.history import WearDrift as WearDrift
 from .wear.history import WearHistory as WearHistory
 from .wear.jump import WearingContact as WearingContact
+from .wear.lift_off import LiftOffChange as LiftOffChange
+from .wear.lift_off import SpeedRatio as SpeedRatio
+from .wear.lift_off import lift_off_change as lift_off_change
+from .wear.lift_off import lift_off_speed as lift_off_speed
+from .wear.lift_off_search import LiftOff as LiftOff
+from .wear.lift_off_search import SearchSettings as SearchSettings
+from .wear.lift_off_search import SpeedShare as SpeedShare
+from .wear.lift_off_search import find_lift_off as find_lift_off
 from .wear.rows import body_column as body_column
 from .wear.run import WearProgress as WearProgress
 from .wear.run import run_wear as run_wear

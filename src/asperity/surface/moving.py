@@ -96,7 +96,12 @@ class MovingSurfaces:
 
     def composite_at(self, time: float) -> Surface:
         """Return the composite roughness at `time` [s], the sum of both on the contact's grid."""
-        first, second = (self._heights_at(index, time) for index in (0, 1))
+        first, second = self.speeds
+        return self.composite_displaced((first * time, second * time))
+
+    def composite_displaced(self, distances: tuple[float, float]) -> Surface:
+        """Return the composite roughness when both bodies have moved by `distances` [m] along x."""
+        first, second = (self._heights_displaced(*moved) for moved in enumerate(distances))
         return Surface(first + second[:, ::-1], self.grid)
 
     def earlier(self, seconds: float) -> "MovingSurfaces":
@@ -162,9 +167,9 @@ class MovingSurfaces:
         speed = abs(self.speeds[index])
         return surface.grid.extent[0] / speed if speed > 0.0 else float("inf")
 
-    def _heights_at(self, index: int, time: float) -> Field:
+    def _heights_displaced(self, index: int, distance: float) -> Field:
         heights = (self.first, self.second)[index].heights
-        cells = self.speeds[index] * time / self.grid.spacing[0]
+        cells = distance / self.grid.spacing[0]
         return shift_periodic(heights, cells, self._spectra[index])[: self.grid.cells[0]]
 
     @cached_property

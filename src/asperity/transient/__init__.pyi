@@ -1,5 +1,4 @@
-from .motion import Memory as Memory
-from .motion import Snapshot as Snapshot
+from .cycle import cycle_contact as cycle_contact
 from .motion import Steps as Steps
 from .motion import moving_contact as moving_contact
 from .motion import step_seconds as step_seconds
@@ -10,3 +9,5 @@ from .running import run_track as run_track
 from .running import settled_from as settled_from
 from .running import solve_passage as solve_passage
 from .running import time_means as time_means
+from .time_step import Memory as Memory
+from .time_step import Snapshot as Snapshot

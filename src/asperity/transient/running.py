@@ -27,7 +27,8 @@ from asperity.ehl import ContactSolution, Options
 from asperity.ehl.outcome import TWO_PRESSURES
 from asperity.lubricant import Lubricant
 from asperity.surface import MovingSurfaces
-from asperity.transient.motion import Snapshot, moving_contact, step_seconds
+from asperity.transient.motion import moving_contact, step_seconds
+from asperity.transient.time_step import Snapshot
 
 PASSAGES, MAX_PASSAGES = 6, 24  # first length of a series, and the largest until it is stationary
 TIME_STEP = 2.0  # cells that the oil travels in a step, if the model follows it over several

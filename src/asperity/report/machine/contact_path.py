@@ -13,7 +13,7 @@ from asperity.core.quantities import Quantity, quantity
 from asperity.machines import DangVan, MachineResult, Rating
 from asperity.report.base import Exhibit, Numbers
 from asperity.report.drawing import display, legend_below, name_axes, panels_in_rows
-from asperity.report.style import BLUE, DASHED, GREY, VERMILION, Medium
+from asperity.report.style import BLUE, DASHED, GREEN, GREY, VERMILION, Medium
 
 SOLVED = (  # key of a row, and of the quantity that formats it
     ("h_central_m", "h_central_m"),
@@ -35,7 +35,7 @@ CONDITIONS_ONLY = (  # for a machine that is not solved
 )
 RATED = {"flash_temperature_max_k": "rated_flash_k"}  # ratings drawn with solved quantities
 RATING = "rating"
-STYLES = ((BLUE, "-", "o"), (VERMILION, "--", "s"))
+STYLES = ((BLUE, "-", "o"), (VERMILION, "--", "s"), (GREEN, "-.", "^"), (GREY, ":", "v"))
 MAX_NAMED = 9  # contacts of one path whose names fit below an axis
 
 

@@ -18,8 +18,10 @@ from asperity.machine import (
     Cam,
     CylindricalRollerBearing,
     FlatCam,
+    FourPointBearing,
     RollerCam,
     SpurGear,
+    TaperedRollerBearing,
     TwinDisc,
 )
 from asperity.machines import MachineResult, machine_conditions
@@ -30,6 +32,7 @@ MM = 1e3
 METAL, MATE, EDGE, IDLE = "#e5e7eb", "#d7dde5", "#556070", "#ffffff"
 HEIGHT = 4.3  # inches
 Polyline = tuple[Field, Field]
+RollingBearing = CylindricalRollerBearing | TaperedRollerBearing | BallBearing | FourPointBearing
 
 
 def machine_sketch(result: MachineResult) -> Exhibit:
@@ -44,7 +47,7 @@ def machine_sketch(result: MachineResult) -> Exhibit:
                 f"line of action from A to E{_single_contact(machine)}. Fillets are not shown."
             ),
         )
-    elif isinstance(machine, CylindricalRollerBearing | BallBearing):
+    elif isinstance(machine, RollingBearing):
         draw, caption = (
             partial(_bearing, machine, result),
             (
@@ -109,9 +112,7 @@ def _frame(axes: Axes, x: tuple[float, float], y: tuple[float, float]) -> None:
 # ---------------------------------------------------------------------------------
 
 
-def _bearing(
-    bearing: CylindricalRollerBearing | BallBearing, result: MachineResult, axes: Axes
-) -> None:
+def _bearing(bearing: RollingBearing, result: MachineResult, axes: Axes) -> None:
     diameter, loads = _loaded_elements(bearing, result)
     middle = bearing.pitch_diameter / 2.0
     radius = diameter / 2.0
@@ -139,12 +140,12 @@ def _draw_rings(axes: Axes, rim: float, outer: float, inner: float, bore: float)
         _circle(axes, 0.0, 0.0, radius, facecolor=colour)
 
 
-def _loaded_elements(
-    bearing: CylindricalRollerBearing | BallBearing, result: MachineResult
-) -> tuple[float, Field]:
+def _loaded_elements(bearing: RollingBearing, result: MachineResult) -> tuple[float, Field]:
     """Return the diameter of the rolling elements [m] and their loads [N]."""
     if isinstance(bearing, BallBearing):
         return bearing.ball_diameter, bearing.loads(result.case.pair)[0]
+    if isinstance(bearing, FourPointBearing):
+        return bearing.ball_diameter, bearing.loads(result.case.pair)[0].max(axis=0)
     return bearing.roller_diameter, bearing.loads
 
 
@@ -167,14 +168,17 @@ def _rolling_element(axes: Axes, number: int, centre: Field, radius: float, shar
     axes.text(MM * x, MM * y, str(number), ha="center", va="center", fontsize="x-small", zorder=3)
 
 
-def _draw_load(axes: Axes, bearing: CylindricalRollerBearing | BallBearing, bore: float) -> None:
+def _draw_load(axes: Axes, bearing: RollingBearing, bore: float) -> None:
     """Draw the load on the shaft and the direction of rotation of the inner ring."""
     labels = []
     if bearing.radial_load > 0.0:
         style: Style = {"arrowstyle": "-|>", "color": VERMILION, "linewidth": 2.0}
         axes.annotate("", (0.0, -MM * 0.55 * bore), (0.0, MM * 0.3 * bore), arrowprops=style)
         labels.append(quantity("load_n").text(bearing.radial_load))
-    axial = getattr(bearing, "axial_load", 0.0)
+    if isinstance(bearing, TaperedRollerBearing):
+        axial = bearing.thrust
+    else:
+        axial = getattr(bearing, "axial_load", 0.0)
     if axial > 0.0:
         labels.append(f"{quantity('load_n').text(axial)} axial")
     axes.text(

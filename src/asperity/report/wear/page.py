@@ -21,7 +21,7 @@ from asperity.report.base import (
     write_page,
 )
 from asperity.report.wear import exhibits
-from asperity.simulation import WearFrame, WearHistory, body_column
+from asperity.simulation import LiftOffChange, WearFrame, WearHistory, body_column
 
 TILES = ("sq_m", "clr", "friction_coefficient", "flash_temperature_max_k", "crf_hz")
 CONTACT = (
@@ -64,18 +64,23 @@ class ComparisonRow(NamedTuple):
 
 
 def write_wear_report(
-    history: WearHistory, path: str | Path, *, figures: str | Path | None = None
+    history: WearHistory,
+    path: str | Path,
+    *,
+    figures: str | Path | None = None,
+    lift_off: LiftOffChange | None = None,
 ) -> Path:
     """Write a self-contained HTML report of a wear history, atomically.
 
-    `figures` is a folder for each figure as PDF (85 and 175 mm wide) and `captions.md`.
+    `figures` is a folder for each figure as PDF (85 and 175 mm wide) and `captions.md`; `lift_off`
+    the change of the lift-off speed, stated below the verdict.
 
     Raises
     ------
     BadInput
         for a path that is not writable.
     """
-    page = write_page(path, lambda: render_wear_page(history))
+    page = write_page(path, lambda: render_wear_page(history, lift_off))
     if figures is not None:
         write_exhibits(wear_exhibits(history), figures)
     return page
@@ -94,7 +99,7 @@ def wear_exhibits(history: WearHistory) -> Iterator[Exhibit]:
         yield exhibits.profiles(tracks)
 
 
-def render_wear_page(history: WearHistory) -> str:
+def render_wear_page(history: WearHistory, lift_off: LiftOffChange | None = None) -> str:
     """Render the page as HTML text."""
     table = history.table
     model = history.contact.model
@@ -106,6 +111,7 @@ def render_wear_page(history: WearHistory) -> str:
         "wear/page.html.j2",
         title="Wear of a contact",
         history=history,
+        lift_off=None if lift_off is None else lift_off.verdict(),
         tiles=_tiles(history),
         headline=exhibits.headline(history).picture(),
         resonance=_resonance(history),

@@ -22,6 +22,7 @@ from asperity.ehl import ContactState
 from asperity.paper import Moment
 from asperity.simulation.wear.frames import WearFrame
 from asperity.simulation.wear.jump import WearingContact
+from asperity.simulation.wear.lift_off import LiftOffChange, Progress, lift_off_change
 from asperity.simulation.wear.notes import history_notes
 from asperity.simulation.wear.rows import RESONANCE, body_column, state_of_row
 from asperity.simulation.wear.state import WearState
@@ -277,6 +278,14 @@ class WearHistory(Displayed):
         slow, fast = (end * hours[-1] for end in self.k_interval)
         rate = (volume[-1] - volume[-2]) / (hours[-1] - hours[-2]) if len(hours) > 1 else 0.0
         return float(np.interp(slow, hours, volume)), float(volume[-1] + rate * (fast - hours[-1]))
+
+    def lift_off(self, progress: Progress | None = None) -> LiftOffChange:
+        """Return the lift-off speeds of the initial and the final tracks.
+
+        Each takes about ten running contacts; `progress` is called after each with its entrainment
+        speed [m/s] and load share.
+        """
+        return lift_off_change(self.case, self.initial_surfaces, self.final_surfaces, progress)
 
     @cached_property
     def stages(self) -> Stages | None:

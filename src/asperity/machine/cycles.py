@@ -1,0 +1,147 @@
+"""Cycles of machines in time: revolution of a cam, passage of a tooth or of a rolling element."""
+
+import math
+from dataclasses import replace
+from functools import singledispatch
+from typing import NamedTuple
+
+import numpy as np
+
+from asperity.contact.conditions import ElasticPair
+from asperity.contact.cycle import OperatingCycle
+from asperity.core.arrays import Field
+from asperity.core.errors import BadInput
+from asperity.machine.ball import BallBearing
+from asperity.machine.cam import Cam
+from asperity.machine.element import Machine, MachineContact
+from asperity.machine.gear import SpurGear
+from asperity.machine.helical import HelicalGear
+from asperity.machine.roller import CylindricalRollerBearing
+
+CAM_ANGLES = 720  # of a revolution
+TOOTH_POINTS = 240  # of the path of contact
+BEARING_ANGLES = 720  # of a revolution of the cage
+LEAST_LOAD = 0.02  # of the largest, at which a load zone begins and ends
+STEP_SHARE = 1e-3  # of the passage, over which a load share changes that does so at once
+
+
+class MachineCycle(NamedTuple):
+    """Cycle of a machine, and the contact whose bodies and geometry it has."""
+
+    contact: MachineContact
+    cycle: OperatingCycle
+
+
+@singledispatch
+def machine_cycle(machine: Machine, pair: ElasticPair) -> MachineCycle:  # noqa: ARG001
+    """Return a machine's cycle, as one of its contacts passes through it.
+
+    Raises
+    ------
+    BadInput
+        for a machine whose contact is constant.
+    """
+    raise BadInput(
+        f"the contact of a {machine.title()} has no cycle of its own; state one in [cycle]"
+    )
+
+
+@machine_cycle.register
+def _of_cam(machine: Cam, pair: ElasticPair) -> MachineCycle:  # noqa: ARG001 (rigid valve train)
+    """Return the revolution of a cam, from the base circle over the nose."""
+    angles = np.linspace(-math.pi, math.pi, CAM_ANGLES + 1)
+    contacts = [machine.contact(float(angle)) for angle in angles]
+    return _cycle(contacts, (angles + math.pi) / machine.speed, machine.place)
+
+
+@machine_cycle.register
+def _of_spur_gear(machine: SpurGear, pair: ElasticPair) -> MachineCycle:  # noqa: ARG001 (rigid teeth)
+    """Return the passage of a tooth from the start to the end of the path of contact."""
+    distances = _tooth_distances(machine)
+    contacts = [machine.contact("tooth", float(distance)) for distance in distances]
+    return _cycle(contacts, _tooth_times(machine, distances), machine.place, continuous=False)
+
+
+@machine_cycle.register
+def _of_helical_gear(machine: HelicalGear, pair: ElasticPair) -> MachineCycle:  # noqa: ARG001 (rigid teeth)
+    """Return the passage of the slice in the middle of the face through the path of contact."""
+    distances = _tooth_distances(machine)
+    ahead = 0.5 * machine.face_width * math.tan(machine.base_helix_angle)
+    contacts = [
+        replace(
+            machine.contact("slice", float(distance)),
+            load=float(machine.line_load(distance, distance - ahead)) * machine.line_length,
+        )
+        for distance in distances
+    ]
+    return _cycle(contacts, _tooth_times(machine, distances), machine.place, continuous=False)
+
+
+@machine_cycle.register(BallBearing)
+@machine_cycle.register(CylindricalRollerBearing)
+def _of_bearing(machine: BallBearing | CylindricalRollerBearing, pair: ElasticPair) -> MachineCycle:
+    """Return the passage of a rolling element through the load zone, at the inner ring.
+
+    Positions are those from the direction of the radial load; the element moves with the cage. A
+    zone that ends is entered and left at a fiftieth of the largest load.
+    """
+    positions = np.linspace(-math.pi, math.pi, BEARING_ANGLES + 1)
+    inner = [
+        contact
+        for contact in machine.contacts_at(positions, pair)
+        if contact.bodies[0] == "inner ring"
+    ]
+    largest = max(contact.load for contact in inner)
+    inner = [contact for contact in inner if contact.load > LEAST_LOAD * largest]
+    angles = np.array([contact.position for contact in inner])
+    return _cycle(
+        inner,
+        (angles - angles[0]) / machine.cage_speed,
+        machine.place,
+        continuous=len(inner) == len(positions),
+    )
+
+
+def _tooth_distances(machine: SpurGear) -> Field:
+    """Return distances along the path of contact [m], close together where the load share jumps."""
+    points = machine.path
+    start, end = points["A"], points["E"]
+    step = STEP_SHARE * (end - start)
+    jumps = np.array([points[name] + side * step for name in ("B", "D") for side in (-0.5, 0.5)])
+    jumps = jumps[(jumps > start + step) & (jumps < end - step)]
+    distances = np.linspace(start, end, TOOTH_POINTS + 1)
+    clear = [np.all(np.abs(jumps - distance) > 0.25 * step) for distance in distances]
+    return np.sort(np.concatenate([distances[clear], jumps]))
+
+
+def _tooth_times(machine: SpurGear, distances: Field) -> Field:
+    """Return the times [s] at which the contact passes distances along the path of contact [m]."""
+    times: Field = (distances - distances[0]) / (machine.speed * machine.base_radii[0])
+    return times
+
+
+def _cycle(
+    contacts: list[MachineContact], times: Field, place: str, *, continuous: bool = True
+) -> MachineCycle:
+    """Return the cycle of successive contacts, with the largest line load of each."""
+    loads = [
+        contact.load if contact.line_load is None else contact.line_load * (contact.length or 0.0)
+        for contact in contacts
+    ]
+    radii = [
+        contact.radius[0] if isinstance(contact.radius, tuple) else contact.radius
+        for contact in contacts
+    ]
+    cycle = OperatingCycle(
+        times=times,
+        loads=loads,
+        speeds=[contact.surface_speeds for contact in contacts],
+        radii=radii,
+        positions=[contact.position for contact in contacts],
+        place=place,
+        continuous=continuous,
+    )
+    moving = [contact for contact in contacts if not contact.stands_still]
+    if not moving:
+        raise BadInput("no contact of the cycle entrains oil; correct the speeds")
+    return MachineCycle(max(moving, key=lambda contact: contact.load), cycle)

@@ -1,0 +1,1 @@
+"""Report of a contact over a cycle of load and speeds."""
