@@ -1,5 +1,6 @@
 """Cycles of load and speeds: their tables, machines, windows of rough contacts, totals."""
 
+import itertools
 import math
 from pathlib import Path
 
@@ -7,13 +8,21 @@ import numpy as np
 import pytest
 
 from asperity.case import load_case, load_machine
+from asperity.contact.conditions import ElasticPair
 from asperity.contact.cycle import OperatingCycle
 from asperity.core.errors import BadInput, UnreadableFile
-from asperity.machine import machine_cycle
+from asperity.machine import BallBearing, HelicalGear, machine_cycle
 from asperity.simulation import CycleInstant, machine_contact_cycle, solve_cycle
-from asperity.simulation.cycle.film import cycle_grid
-from asperity.simulation.cycle.instants import CELLS, SLIDING_CELLS, window_times
+from asperity.simulation.cycle.film import cycle_grid, merged, smooth_surfaces
+from asperity.simulation.cycle.instants import (
+    CELLS,
+    SLIDING_CELLS,
+    InstantJob,
+    solve_instant,
+    window_times,
+)
 from asperity.simulation.cycle.result import CycleResult
+from asperity.transient import cycle_contact
 from asperity.wear import WearCoefficient
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -61,10 +70,10 @@ def turning(speed=2.0, period=0.04, sliding=0.5):
 
 
 def test_conditions_between_the_rows_vary_linearly():
-    instant = ramp().at(2.0)
-    assert instant == (2.0, 300.0, (1.0, 1.0), 0.02)
+    instant = ramp().state(2.0)
+    assert instant == (2.0, 300.0, (1.0, 1.0), 0.02, 300.0)
     assert (instant.entrainment_speed, instant.sliding_speed) == (1.0, 0.0)
-    assert ramp().at(0.5).speeds == (3.0, 1.0)
+    assert ramp().state(0.5).speeds == (3.0, 1.0)
 
 
 def test_paths_are_the_integrals_of_the_speeds():
@@ -73,17 +82,21 @@ def test_paths_are_the_integrals_of_the_speeds():
     assert cycle.travelled(1.0) == pytest.approx((3.0, 1.0))
     assert cycle.travelled(2.0) == pytest.approx((3.0 + 2.5, 1.0 + 1.5))
     assert cycle.travelled(3.0) == pytest.approx((3.0 + 2.0, 1.0 + 2.0))
+    # outside a cycle that does not repeat, the speeds are those of its ends
+    assert cycle.travelled(-1.0) == pytest.approx((-2.0, 0.0))
+    assert cycle.travelled(4.0) == pytest.approx((5.0 - 2.0, 3.0))
+    assert cycle.state(-1.0)[1:] == cycle.state(0.0)[1:]
     turns = turning()
     times = np.linspace(-0.02, 0.1, 4001)
     paths = np.array([turns.travelled(float(time)) for time in times])
-    speeds = np.array([turns.at(float(time)).speeds for time in times])
+    speeds = np.array([turns.state(float(time)).speeds for time in times])
     slopes = np.diff(paths, axis=0) / np.diff(times)[:, None]
     np.testing.assert_allclose(slopes, 0.5 * (speeds[1:] + speeds[:-1]), atol=2e-3)
 
 
 def test_a_cycle_repeats_only_if_its_ends_agree():
     assert turning().repeats
-    assert turning().at(0.05).load == turning().at(0.01).load
+    assert turning().state(0.05).load == turning().state(0.01).load
     assert not ramp().repeats
     passage = OperatingCycle([0.0, 1.0], [5.0, 5.0], [(1.0, 1.0)] * 2, [0.1, 0.1], continuous=False)
     assert not passage.repeats
@@ -109,7 +122,8 @@ def test_x_points_in_the_direction_of_entrainment():
         ({"speeds": [(1.0, 0.0), (math.inf, 0.0), (1.0, 0.0)]}, "speeds of a cycle must be finite"),
         ({"loads": [100.0, 200.0]}, "a cycle of 3 times needs as many"),
         ({"times": [0.0]}, "2 to 100000 rows, got 1"),
-        ({"speeds": [(0.0, 0.0)] * 3}, "never move"),
+        ({"times": [0.0, 1.0, math.inf]}, "times of a cycle must be finite"),
+        ({"positions": [0.0, 1.0]}, "as many positions and carried loads, got 2 and 3"),
     ],
 )
 def test_impossible_tables_are_rejected(changes, message):
@@ -149,7 +163,7 @@ def test_steps_of_a_window_follow_the_oil_over_whole_cells(time):
     assert np.all(np.diff(times) > 0.0)
     assert np.max(np.diff(times)) <= 1.001 * cycle.period / 200.0
     whole = 0
-    for begin, end in zip(times[:-1], times[1:], strict=True):
+    for begin, end in itertools.pairwise(times):
         before, after = cycle.travelled(begin), cycle.travelled(end)
         first, second = ((b - a) / spacing for a, b in zip(before, after, strict=True))
         oil, slid = abs(0.5 * (first + second)), 0.5 * abs(first - second)
@@ -161,10 +175,57 @@ def test_steps_of_a_window_follow_the_oil_over_whole_cells(time):
         assert whole == len(times) - 1
 
 
-def test_a_window_ends_with_a_cycle_that_does_not_repeat():
-    times = window_times(ramp(), 2.9999, 4e-6, 80e-6)
-    assert times[-1] <= 3.0
-    assert window_times(ramp(), 0.0, 4e-6, 80e-6)[0] == 0.0
+def test_a_window_extends_beyond_a_cycle_that_does_not_repeat():
+    """At the conditions of its end, so that its first instant has forgotten the start, too."""
+    for time in (0.0, 3.0):
+        times = window_times(ramp(), time, 4e-6, 80e-6)
+        assert times[0] < time < times[-1]
+        assert np.all(np.diff(times) > 0.0)
+    from_rest = window_times(ramp(), 1e-5, 4e-6, 80e-6, 0.0)
+    assert from_rest[0] == 0.0
+    assert window_times(ramp(), 0.0, 4e-6, 80e-6, 0.0)[0] == 0.0
+
+
+def test_the_first_instant_of_an_asymmetric_table_is_solved():
+    case = load_case(EXAMPLES / "paper.toml").among_many
+    cycle = OperatingCycle(
+        times=[0.0, 0.002, 0.004],
+        loads=[500.0, 300.0, 400.0],
+        speeds=[(2.0, 1.0), (1.2, 2.0), (2.0, 1.5)],
+        radii=[case.conditions.radius] * 3,
+    )
+    first = solve_instant(InstantJob(case, cycle, 0.0, 0, coarse=True, start="steady"))
+    assert (first.reason, first.failed) == ("", 0)
+    assert 0.1 < first.numbers["clr"] < 0.9
+
+
+def test_steps_of_no_length_are_rejected():
+    case = load_case(EXAMPLES / "paper.toml").with_written({"surface": "flat"})
+    grid = cycle_grid(turning(), case.conditions, case.lubricant)
+    steps = cycle_contact(
+        turning(), case.conditions, case.lubricant, smooth_surfaces(grid), np.zeros(2)
+    )
+    with pytest.raises(BadInput, match="must increase"):
+        next(steps)
+
+
+def test_a_grid_holds_a_short_peak_of_the_load():
+    case = load_case(EXAMPLES / "paper.toml")
+    peak = OperatingCycle(
+        times=[0.0, 0.0505, 0.051, 0.0515, 0.1],
+        loads=[500.0, 500.0, 20e3, 500.0, 500.0],
+        speeds=[(1.0, 1.0)] * 5,
+        radii=[0.01] * 5,
+    )
+    grid = cycle_grid(peak, case.conditions, case.lubricant)
+    half_width = peak.conditions(0.051, case.conditions).hertz.half_widths[0]
+    assert grid.lower[0] <= -2.0 * half_width
+    assert grid.upper[0] >= 1.5 * half_width
+
+
+def test_times_equal_but_for_rounding_are_one():
+    times = merged(np.array([0.0, 0.1, 0.3]), np.array([0.1 + 1e-17, 0.2]), period=0.3)
+    assert times == pytest.approx([0.0, 0.1, 0.2, 0.3])
 
 
 # Case files
@@ -185,10 +246,10 @@ def test_start_and_stop_scale_the_speeds_of_the_contact(tmp_path):
     )
     cycle = case.contents.cycle.cycle(case.conditions, case.folder)
     np.testing.assert_allclose(cycle.times, [0.0, 0.1, 1.1, 1.3, 1.6])
-    assert cycle.at(0.05).speeds == pytest.approx(
+    assert cycle.state(0.05).speeds == pytest.approx(
         tuple(0.5 * speed for speed in case.conditions.surface_speeds)
     )
-    assert cycle.at(1.5).speeds == (0.0, 0.0)
+    assert cycle.state(1.5).speeds == (0.0, 0.0)
     assert cycle.repeats
     assert load_case(case.text, folder=case.folder) == case
 
@@ -199,8 +260,8 @@ def test_an_oscillation_is_a_cosine_of_both_speeds(tmp_path):
     assert cycle.period == pytest.approx(0.04)
     assert cycle.reverses
     first, second = case.conditions.surface_speeds
-    assert cycle.at(0.0).speeds == pytest.approx((first, second))
-    assert cycle.at(0.02).speeds == pytest.approx((-first, -second))
+    assert cycle.state(0.0).speeds == pytest.approx((first, second))
+    assert cycle.state(0.02).speeds == pytest.approx((-first, -second))
     stroke = cycle.travelled(0.01)[0]
     assert stroke == pytest.approx(first / (2.0 * math.pi * 25.0), rel=1e-4)
 
@@ -211,7 +272,7 @@ def test_a_table_is_read_with_its_columns(tmp_path):
     )
     case = case_with(tmp_path, '\n[cycle]\nkind = "table"\nfile = "cycle.csv"\n')
     cycle = case.contents.cycle.cycle(case.conditions, case.folder)
-    assert cycle.at(0.25) == (0.25, 200.0, (1.5, 2.0), case.conditions.radius)
+    assert cycle.state(0.25)[:4] == (0.25, 200.0, (1.5, 2.0), case.conditions.radius)
 
 
 @pytest.mark.parametrize(
@@ -247,8 +308,18 @@ def test_instants_outside_the_cycle_are_rejected(tmp_path):
     case = case_with(tmp_path, '\n[cycle]\nkind = "oscillation"\nfrequency = "25 Hz"\n')
     with pytest.raises(BadInput, match=r"between 0 and the period of 0\.04 s"):
         solve_cycle(case, instants=[0.0, 0.05])
-    with pytest.raises(BadInput, match="2 to 200, got 1"):
-        solve_cycle(case, instants=1)
+    for count in (0, 1):
+        with pytest.raises(BadInput, match=f"2 to 200, got {count}"):
+            solve_cycle(case, instants=count)
+
+
+def test_a_cycle_without_entrainment_is_rejected(tmp_path):
+    (tmp_path / "cycle.csv").write_text(
+        "time_s,load_n,speed_first_m_s,speed_second_m_s\n0,100,1,-1\n0.5,300,2,-2\n", "utf-8"
+    )
+    case = case_with(tmp_path, '\n[cycle]\nkind = "table"\nfile = "cycle.csv"\n', surface="flat")
+    with pytest.raises(BadInput, match="entrains no oil at any time"):
+        solve_cycle(case)
 
 
 # Machines
@@ -267,14 +338,14 @@ def test_a_cam_turns_once_in_its_period(tmp_path):
     assert cycle.period == pytest.approx(0.06)
     assert cycle.repeats
     assert cycle.place == "cycle_angle"
-    nose = cycle.at(0.03)
+    nose = cycle.state(0.03)
     assert cycle.position(0.03) == pytest.approx(0.0, abs=1e-9)
     bend = -0.5 * 7e-3 * (math.pi / math.radians(75.0)) ** 2
     radius = 20e-3 + 7e-3 + bend
     assert nose.radius == pytest.approx(radius, rel=1e-3)
     assert nose.speeds == pytest.approx((speed * radius, speed * bend), rel=1e-3)
     assert nose.load == pytest.approx(250.0 + 35e3 * 7e-3 + 0.15 * speed**2 * bend, rel=1e-3)
-    base = cycle.at(0.0)
+    base = cycle.state(0.0)
     assert (base.load, base.radius) == pytest.approx((250.0, 20e-3))
     assert base.speeds == pytest.approx((speed * 20e-3, 0.0))
 
@@ -301,7 +372,7 @@ def test_a_tooth_passes_the_path_of_contact_with_its_load_shares():
         np.asarray(cycle.loads) / gear.normal_force,
     )
     assert jump == pytest.approx([2 / 3, 1.0], rel=5e-3)
-    pitch = cycle.at(float(np.interp(points["C"], cycle.positions, cycle.times)))
+    pitch = cycle.state(float(np.interp(points["C"], cycle.positions, cycle.times)))
     assert abs(pitch.sliding_speed) < 2e-3 * pitch.entrainment_speed
 
 
@@ -314,16 +385,29 @@ def test_two_teeth_carry_the_whole_load_of_a_spur_gear():
         assert shares.sum() == pytest.approx(case.machine.normal_force, rel=1e-3)
 
 
-def test_the_slices_of_a_helical_gear_carry_its_load(tmp_path):
-    text = (EXAMPLES / "fzg-c.toml").read_text("utf-8")
-    text = text.replace('"spur-gear"', '"helical-gear"\nmachine.helix_angle = "15 deg"', 1)
-    case = machine(tmp_path, text)
-    contact, cycle = machine_cycle(case.machine, case.pair)
-    gear = case.machine
-    largest = max(gear.share(float(s)) for s in np.linspace(gear.path["A"], gear.path["E"], 200))
-    assert max(cycle.loads) <= largest * gear.normal_force / gear.face_width * gear.line_length
-    assert max(cycle.loads) > 0.9 * contact.load
-    assert min(cycle.loads) > 0.0
+def test_the_slice_of_a_helical_gear_passes_with_its_line_load():
+    gear = HelicalGear(
+        module=4.5e-3,
+        teeth=(16, 24),
+        pressure_angle=math.radians(20.0),
+        profile_shift=(0.18, 0.17),
+        face_width=0.06,
+        torque=265.1,
+        speed=227.0,
+        helix_angle=math.radians(15.0),
+    )
+    contact, cycle = machine_cycle(gear, ElasticPair((206e9, 206e9), (0.3, 0.3)))
+    ahead = 0.5 * gear.face_width * math.tan(gear.base_helix_angle)
+    for distance, load in zip(cycle.positions[::40], cycle.loads[::40], strict=True):
+        line_load = float(gear.line_load(distance, distance - ahead))
+        assert load == pytest.approx(line_load * gear.line_length, rel=1e-9)
+        # of one slice, never more than the largest of a mesh cycle
+        assert load <= (1.0 + 1e-9) * gear.contact("slice", distance).load
+    assert contact.load == pytest.approx(max(cycle.loads))
+    assert contact.length == gear.line_length
+    # energy and wear count all slices of the face, b/cos β_b long
+    whole = gear.face_width / math.cos(gear.base_helix_angle) / gear.line_length
+    assert np.asarray(cycle.carried) == pytest.approx(whole * np.asarray(cycle.loads))
 
 
 @pytest.mark.parametrize("name", ["6206", "nu206"])
@@ -347,14 +431,41 @@ def test_a_rolling_element_passes_the_load_zone_with_the_cage(name):
     assert cycle.loads[0] == pytest.approx(0.02 * max(cycle.loads), rel=0.5)
 
 
+def test_a_profiled_roller_is_solved_for_its_line_load_and_counted_with_its_load(tmp_path):
+    text = (EXAMPLES / "nu206.toml").read_text("utf-8") + '\nmachine.profile = "iso"\n'
+    text = text.replace("\n[", '\nmachine.profile = "iso"\n[', 1) if "\n[" in text else text
+    case = machine(tmp_path, text)
+    _, cycle = machine_cycle(case.machine, case.pair)
+    worst = max(case.contacts, key=lambda contact: contact.load)
+    assert max(cycle.carried) == pytest.approx(worst.load, rel=1e-6)
+    assert max(cycle.loads) == pytest.approx(worst.line_load * worst.length, rel=1e-6)
+    assert max(cycle.loads) > 1.1 * max(cycle.carried)
+
+
+def test_a_load_zone_in_two_parts_is_followed_through_the_heavier_one():
+    bearing = BallBearing(
+        balls=9,
+        ball_diameter=7.94e-3,
+        pitch_diameter=39.04e-3,
+        speed=188.0,
+        radial_load=300.0,
+        tilt=8e-3,
+    )
+    pair = ElasticPair((206e9, 206e9), (0.3, 0.3))
+    _, cycle = machine_cycle(bearing, pair)
+    assert not cycle.repeats
+    assert max(cycle.loads[0], cycle.loads[-1]) < 0.1 * max(cycle.loads)
+    assert np.max(np.abs(np.diff(cycle.loads))) < 0.05 * max(cycle.loads)  # no gap is bridged
+
+
 def test_a_stated_cycle_applies_to_the_most_loaded_contact(tmp_path):
     text = (EXAMPLES / "6206.toml").read_text("utf-8")
     case = machine(tmp_path, text + '\n[cycle]\nkind = "oscillation"\nfrequency = "2 Hz"\n')
     chosen, cycle = machine_contact_cycle(case)
     worst = max(case.contacts, key=lambda contact: contact.load)
     assert chosen.conditions.load == pytest.approx(worst.load)
-    assert cycle.at(0.0).load == pytest.approx(worst.load)
-    assert cycle.at(0.25).entrainment_speed == pytest.approx(-worst.entrainment_speed)
+    assert cycle.state(0.0).load == pytest.approx(worst.load)
+    assert cycle.state(0.25).entrainment_speed == pytest.approx(-worst.entrainment_speed)
 
 
 def test_a_machine_of_constant_contact_has_no_cycle(tmp_path):
@@ -390,6 +501,7 @@ def result_of(instants, wear=None):
         coarse=None,
         steady_times=np.array([]),
         steady=[],
+        steady_thinnest=math.nan,
         instants=tuple(instants),
         wear_coefficients=wear,
         seconds=0.0,
@@ -405,7 +517,7 @@ class Course:
 
 def test_friction_energy_is_force_times_path():
     """0.1 times 300 N over 0.5 m/s for 2 s, with the interval of the coefficient."""
-    result = result_of([instant(0.0, 0.5), instant(1.0, 0.5)])
+    result = result_of([instant(time, 0.5) for time in (0.0, 0.5, 1.0, 1.5)])
     object.__setattr__(result, "film", Course())
     energy = result.friction_energy
     assert energy.value == pytest.approx(30.0)
@@ -414,7 +526,10 @@ def test_friction_energy_is_force_times_path():
 
 def test_wear_is_archards_with_the_load_of_the_asperities():
     first, second = WearCoefficient.from_value(1e-15), WearCoefficient.from_value(3e-15)
-    result = result_of([instant(0.0, 0.5), instant(1.0, 0.1)], (first, second))
+    result = result_of(
+        [instant(0.0, 0.5), instant(0.5, 0.3), instant(1.0, 0.1), instant(1.5, 0.3)],
+        (first, second),
+    )
     object.__setattr__(result, "film", Course())
     worn = result.wear_volume(0)
     assert worn.value == pytest.approx(1e-15 * 0.3 * 300.0 * 1.0, rel=1e-6)
@@ -425,6 +540,11 @@ def test_wear_is_archards_with_the_load_of_the_asperities():
 
 
 def test_a_number_without_an_interval_gives_a_total_without_one():
+    few = result_of(
+        [instant(0.0, 0.5), instant(1.0, 0.1)]
+    )  # nor do few instants, by their distance
+    object.__setattr__(few, "film", Course())
+    assert (few.mean_clr.value, few.mean_clr.low) == (pytest.approx(0.3), None)
     result = result_of([instant(0.0, 0.5, half=None), instant(1.0, 0.1)])
     object.__setattr__(result, "film", Course())
     assert result.mean_clr.value == pytest.approx(0.3)

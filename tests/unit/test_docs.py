@@ -188,7 +188,7 @@ def case_tables() -> dict[str, dict[str, str]]:
                 line.text.lstrip("# ")
                 if line.text.startswith("#")
                 else name
-                if heading in ("[surface]", "[machine]")
+                if heading in ("[surface]", "[machine]", "[cycle]")
                 else heading
             )
         )
@@ -229,7 +229,7 @@ def test_the_case_file_has_every_key_with_its_default(name):
 
 
 def is_table(name: str, key: str) -> bool:
-    return name == "Top level" and (key == "surface" or f"[{key}]" in case_sections())
+    return name == "Top level" and (key in ("surface", "cycle") or f"[{key}]" in case_sections())
 
 
 def is_default(text: str, field: FieldInfo) -> bool:

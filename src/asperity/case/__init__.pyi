@@ -2,6 +2,9 @@ from .case import DEFAULT_SURFACES as DEFAULT_SURFACES
 from .case import DEFAULT_SURFACES_FINE as DEFAULT_SURFACES_FINE
 from .case import Case as Case
 from .case import load_case as load_case
+from .cycle import OscillationSection as OscillationSection
+from .cycle import StartStopSection as StartStopSection
+from .cycle import TableCycleSection as TableCycleSection
 from .infer import MOST_POINTS as MOST_POINTS
 from .infer import InferSection as InferSection
 from .infer import PriorSection as PriorSection

@@ -118,12 +118,28 @@ def read_cycle(path: Path, contact: ContactConditions) -> OperatingCycle:
             f"{path} must have the columns {', '.join(COLUMNS)}, and perhaps {RADIUS}; got "
             f"{', '.join(map(str, names)) or 'none'}"
         )
-    columns = {name: [_number(row[name], name, path) for row in rows] for name in names}
+    columns = {
+        name: [
+            _number(
+                row[name],
+                name,
+                path,
+            )
+            for row in rows
+        ]
+        for name in names
+    }
     radius = contact.radius_along_rolling
     return OperatingCycle(
         times=columns["time_s"],
         loads=columns["load_n"],
-        speeds=list(zip(columns[COLUMNS[2]], columns[COLUMNS[3]], strict=True)),
+        speeds=list(
+            zip(
+                columns[COLUMNS[2]],
+                columns[COLUMNS[3]],
+                strict=True,
+            )
+        ),
         radii=columns.get(RADIUS, [radius] * len(rows)),
     )
 

@@ -23,6 +23,7 @@ from asperity.case.units import (
     Length,
     Number,
     SpeedOrRest,
+    amount_in,
     default_amount,
     parse_amount,
     plain,
@@ -130,9 +131,13 @@ class SolverSection(Section):
 
 
 class InletSection(Section):
-    """[inlet]: oil that enters the contact."""
+    """[inlet]: oil that enters the contact, and how a track is replenished between passes."""
 
     layer: Length  # on both bodies together, ahead of the contact
+    passes: Count = 20  # of the contact over the track, in `asperity deplete`
+    interval: Annotated[float | None, amount_in("s"), OPTIONAL] = None  # between two passes
+    bleed: Annotated[float, amount_in("m", 0.0)] = default_amount(0.0, "m")  # oil added between
+    surface_tension: Annotated[float, amount_in("N/m", 0.0)] = default_amount(0.03, "N/m")
 
 
 class MotionSection(Section):

@@ -9,12 +9,10 @@ from asperity.cli import (
     benchmark,
     check,
     contact,
-    cycle,
     export,
     friction,
     infer,
     machine,
-    motion,
     new,
     observe,
     page,
@@ -26,9 +24,9 @@ from asperity.cli import (
     surface,
     track_watch,
     vibrate,
-    wear,
 )
 from asperity.cli.app import app, main
+from asperity.cli.simulated import cycle, deplete, motion, wear
 
 __all__ = [
     "app",
@@ -36,6 +34,7 @@ __all__ = [
     "check",
     "contact",
     "cycle",
+    "deplete",
     "export",
     "friction",
     "infer",

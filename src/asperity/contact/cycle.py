@@ -19,16 +19,17 @@ MAX_ROWS = 100_000
 SAME = 1e-9  # relative difference between the ends of a cycle that repeats
 
 
-class Instant(NamedTuple):
+class CycleState(NamedTuple):
     """Contact at one time of a cycle: `load` [N], `speeds` of both surfaces [m/s], `radius` [m].
 
-    The radius is that along rolling.
+    The radius is that along rolling; `carried` is the load that energy and wear count [N].
     """
 
     time: float
     load: float
     speeds: tuple[float, float]
     radius: float
+    carried: float
 
     @property
     def entrainment_speed(self) -> float:
@@ -54,6 +55,8 @@ class OperatingCycle:
     positions : where in a machine's cycle the contact is, (n,), such as an angle [rad]
     place : key of the quantity of the positions
     continuous : the cycle may follow itself; False for a passage that begins without contact
+    carried : load that energy and wear count [N], (n,), where the contact is solved for the line
+        load of its most loaded slice; default: the loads
 
     Raises
     ------
@@ -70,7 +73,7 @@ class OperatingCycle:
     ...     speeds=[(1.0, 1.0), (0.0, 0.0)],
     ...     radii=[0.01, 0.01],
     ... )
-    >>> stop.at(0.05).entrainment_speed
+    >>> stop.state(0.05).entrainment_speed
     0.5
     """
 
@@ -81,32 +84,54 @@ class OperatingCycle:
     positions: Sequence[float] | Field | None = None
     place: str = ""
     continuous: bool = True
+    carried: Sequence[float] | Field | None = None
 
     def __post_init__(self) -> None:
-        for name in ("times", "loads", "speeds", "radii"):
-            object.__setattr__(self, name, np.asarray(getattr(self, name), float))
+        if self.carried is None:
+            object.__setattr__(self, "carried", self.loads)
+        for name in ("times", "loads", "speeds", "radii", "carried"):
+            object.__setattr__(
+                self,
+                name,
+                np.asarray(getattr(self, name), float),
+            )
         rows = len(self._times)
         if not 2 <= rows <= MAX_ROWS:
             raise BadInput(f"a cycle has 2 to {MAX_ROWS} rows, got {rows}; correct its table")
+        self._require_columns(rows)
+        if not np.all(np.isfinite(self._times)):
+            raise BadInput("the times of a cycle must be finite; correct its table")
+        if self._times[0] != 0.0 or not np.all(np.diff(self._times) > 0.0):
+            raise BadInput("the times of a cycle must increase from 0; sort its table")
+        self._require_positive("load", self._loads, "N")
+        self._require_positive("radius", self._radii, "m")
+        if not np.all(np.isfinite(self._speeds)):
+            raise BadInput("the speeds of a cycle must be finite; correct its table")
+
+    def _require_columns(self, rows: int) -> None:
+        """Raise BadInput for columns of another length."""
         shapes = [self._loads.shape, self._radii.shape, self._speeds.shape]
         if shapes != [(rows,), (rows,), (rows, 2)]:
             raise BadInput(
                 f"a cycle of {rows} times needs as many loads, pairs of speeds and radii, got "
                 f"{[shape[0] for shape in shapes]}; complete its table"
             )
-        if self._times[0] != 0.0 or not np.all(np.diff(self._times) > 0.0):
-            raise BadInput("the times of a cycle must increase from 0; sort its table")
-        for name, values, unit in (("load", self._loads, "N"), ("radius", self._radii, "m")):
-            if not np.all((values > 0.0) & np.isfinite(values)):
-                row = int(np.argmin(np.where(np.isfinite(values), values, -np.inf)))
-                raise BadInput(
-                    f"the {name} of a cycle must be positive, got {values[row]:g} {unit} at "
-                    f"{self._times[row]:g} s; leave out the part without contact"
-                )
-        if not np.all(np.isfinite(self._speeds)):
-            raise BadInput("the speeds of a cycle must be finite; correct its table")
-        if not np.any(self._speeds):
-            raise BadInput("the surfaces of a cycle never move; state their speeds")
+        placed = np.zeros(rows) if self.positions is None else np.asarray(self.positions, float)
+        if placed.shape != (rows,) or self._carried.shape != (rows,):
+            raise BadInput(
+                f"a cycle of {rows} times needs as many positions and carried loads, got "
+                f"{placed.size} and {self._carried.size}; complete them"
+            )
+
+    def _require_positive(self, name: str, values: Field, unit: str) -> None:
+        """Raise BadInput for a column with a value that is not positive and finite."""
+        wrong = np.flatnonzero(~((values > 0.0) & np.isfinite(values)))
+        if wrong.size:
+            row = wrong[0]
+            raise BadInput(
+                f"the {name} of a cycle must be positive, got {values[row]:g} {unit} at "
+                f"{self._times[row]:g} s; leave out the part without contact"
+            )
 
     @property
     def _times(self) -> Field:
@@ -121,6 +146,10 @@ class OperatingCycle:
         return np.asarray(self.speeds)
 
     @property
+    def _carried(self) -> Field:
+        return np.asarray(self.carried)
+
+    @property
     def _radii(self) -> Field:
         return np.asarray(self.radii)
 
@@ -128,14 +157,20 @@ class OperatingCycle:
         """Return where in the machine's cycle the contact is at a time [s], if that is known."""
         if self.positions is None:
             return None
-        return float(np.interp(time, self._times, np.asarray(self.positions, float)))
+        return float(
+            np.interp(
+                time,
+                self._times,
+                np.asarray(self.positions, float),
+            )
+        )
 
     @property
     def period(self) -> float:
         """Duration [s]."""
         return float(self._times[-1])
 
-    @property
+    @cached_property
     def repeats(self) -> bool:
         """True if the cycle can follow itself: continuous, and its last row equals the first."""
         columns = (self._loads, self._radii, *self._speeds.T)
@@ -149,24 +184,46 @@ class OperatingCycle:
         means = self._speeds.mean(axis=1)
         return bool(np.min(means) < 0.0 < np.max(means))
 
-    def at(self, time: float) -> Instant:
-        """Return the contact at a time [s]; of a cycle that repeats also after its end."""
+    def state(self, time: float) -> CycleState:
+        """Return the contact at a time [s]; outside a cycle that does not repeat, that of its end.
+
+        A cycle that repeats goes on.
+        """
+        within = time
         if self.repeats and not 0.0 <= time <= self.period:
-            time = time % self.period
-        load, first, second, radius = (
-            float(np.interp(time, self._times, column))
-            for column in (self._loads, *self._speeds.T, self._radii)
+            within = time % self.period
+        load, first, second, radius, carried = (
+            float(np.interp(within, self._times, column))
+            for column in (self._loads, *self._speeds.T, self._radii, self._carried)
         )
-        return Instant(time, load, (first, second), radius)
+        return CycleState(time, load, (first, second), radius, carried)
+
+    def columns(self, times: Field) -> tuple[Field, Field, Field]:
+        """Return entrainment and sliding speed [m/s], with sign, and carried load [N], (n,)."""
+        first, second, carried = (
+            np.interp(
+                times,
+                self._times,
+                column,
+            )
+            for column in (*self._speeds.T, self._carried)
+        )
+        return 0.5 * (first + second), first - second, carried
 
     def travelled(self, time: float) -> tuple[float, float]:
-        """Return the distances by which both surfaces have moved since time 0 [m], with sign."""
+        """Return the distances by which both surfaces have moved since time 0 [m], with sign.
+
+        Outside a cycle that does not repeat, the speeds are those of its ends.
+        """
         turns, rest = divmod(time, self.period) if self.repeats else (0.0, time)
-        rest = min(rest, self.period)
-        row = min(int(np.searchsorted(self._times, rest, side="right")) - 1, len(self._times) - 2)
-        speeds = np.array(self.at(rest).speeds)
-        part = 0.5 * (self._speeds[row] + speeds) * (rest - self._times[row])
-        first, second = turns * self._distances[-1] + self._distances[row] + part
+        within = min(max(rest, 0.0), self.period)
+        row = int(np.searchsorted(self._times, within, side="right")) - 1
+        row = min(max(row, 0), len(self._times) - 2)
+        speeds = np.array(self.state(within).speeds)
+        part = 0.5 * (self._speeds[row] + speeds) * (within - self._times[row])
+        first, second = (
+            turns * self._distances[-1] + self._distances[row] + part + speeds * (rest - within)
+        )
         return float(first), float(second)
 
     @cached_property
@@ -182,7 +239,7 @@ class OperatingCycle:
         time : [s]
         contact : its bodies and geometry; of an elliptic contact, the radius across is kept
         """
-        instant = self.at(time)
+        instant = self.state(time)
         side = -1.0 if instant.entrainment_speed < 0.0 else 1.0
         first, second = instant.speeds
         return conditions_of(instant, contact, (side * first, side * second))
@@ -199,13 +256,17 @@ class OperatingCycle:
         for column in (*roots, *(self._speeds.T / top)):
             change = change + np.abs(np.diff(column))
         passed = np.concatenate([[0.0], np.cumsum(change)])
-        times = np.interp(np.linspace(0.0, passed[-1], steps + 1), passed, self._times)
+        times = np.interp(
+            np.linspace(0.0, passed[-1], steps + 1),
+            passed,
+            self._times,
+        )
         times[0], times[-1] = 0.0, self.period
         return times
 
 
 def conditions_of(
-    instant: Instant, contact: ContactConditions, speeds: tuple[float, float]
+    instant: CycleState, contact: ContactConditions, speeds: tuple[float, float]
 ) -> ContactConditions:
     """Return the conditions of a contact at an instant, with other surface speeds [m/s]."""
     radius = contact.radius

@@ -1,7 +1,7 @@
 """Solve a contact from conditions, lubricant and surface, by the model of the options."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -18,7 +18,7 @@ from asperity.ehl.film_formulas import central_film, require_thin_film
 from asperity.ehl.models.elastic_dry import elastic_contact
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.single_pressure import Step, newton
-from asperity.ehl.outcome import ARITHMETIC, ATTEMPTS, FROM_DRY, PAPER, Options
+from asperity.ehl.outcome import ARITHMETIC, ATTEMPTS, FROM_DRY, MIXED, PAPER, Options
 from asperity.ehl.problem_setup import (
     contact_problem,
     first_guess,
@@ -203,7 +203,7 @@ def solve_starved(
     )
     solution = None if start is None else solve(options=options, start=start)
     if solution is None or not solution.convergence.converged:
-        flooded = solve(options=replace(options, inlet_layer=None))
+        flooded = _flooded(solve, replace(options, inlet_layer=None))
         if conditions.endless and passes_less(flooded, options.inlet_layer):
             return flooded
         for front in FRONTS:
@@ -214,6 +214,16 @@ def solve_starved(
     assert solution is not None
     taken = replace(solution.convergence, seconds=time.perf_counter() - began)
     return replace(solution, convergence=taken)
+
+
+def _flooded(solve: Callable[..., ContactSolution], options: Options) -> ContactSolution:
+    """Return the flooded contact, from that of the model "mixed" if this converges."""
+    guess = solve(options=replace(options, model=MIXED))
+    if guess.convergence.converged:
+        solution = solve(options=options, start=guess)
+        if solution.convergence.converged:
+            return solution
+    return solve(options=options)
 
 
 def _solve_cold(

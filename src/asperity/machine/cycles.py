@@ -6,6 +6,7 @@ from functools import singledispatch
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from asperity.contact.conditions import ElasticPair
 from asperity.contact.cycle import OperatingCycle
@@ -59,7 +60,12 @@ def _of_spur_gear(machine: SpurGear, pair: ElasticPair) -> MachineCycle:  # noqa
     """Return the passage of a tooth from the start to the end of the path of contact."""
     distances = _tooth_distances(machine)
     contacts = [machine.contact("tooth", float(distance)) for distance in distances]
-    return _cycle(contacts, _tooth_times(machine, distances), machine.place, continuous=False)
+    return _cycle(
+        contacts,
+        _tooth_times(machine, distances),
+        machine.place,
+        continuous=False,
+    )
 
 
 @machine_cycle.register
@@ -67,14 +73,19 @@ def _of_helical_gear(machine: HelicalGear, pair: ElasticPair) -> MachineCycle:  
     """Return the passage of the slice in the middle of the face through the path of contact."""
     distances = _tooth_distances(machine)
     ahead = 0.5 * machine.face_width * math.tan(machine.base_helix_angle)
+    line_loads = machine.line_load(distances, distances - ahead)
     contacts = [
-        replace(
-            machine.contact("slice", float(distance)),
-            load=float(machine.line_load(distance, distance - ahead)) * machine.line_length,
-        )
-        for distance in distances
+        replace(machine.contact("slice", float(distance)), load=float(load) * machine.line_length)
+        for distance, load in zip(distances, line_loads, strict=True)
     ]
-    return _cycle(contacts, _tooth_times(machine, distances), machine.place, continuous=False)
+    across = machine.face_width / math.cos(machine.base_helix_angle)  # all slices of the face
+    return _cycle(
+        contacts,
+        _tooth_times(machine, distances),
+        machine.place,
+        continuous=False,
+        carried=across * line_loads,
+    )
 
 
 @machine_cycle.register(BallBearing)
@@ -85,21 +96,47 @@ def _of_bearing(machine: BallBearing | CylindricalRollerBearing, pair: ElasticPa
     Positions are those from the direction of the radial load; the element moves with the cage. A
     zone that ends is entered and left at a fiftieth of the largest load.
     """
-    positions = np.linspace(-math.pi, math.pi, BEARING_ANGLES + 1)
-    inner = [
-        contact
+    positions = np.linspace(-math.pi, math.pi, BEARING_ANGLES + 1)[:-1]
+    inner = {
+        contact.position: contact
         for contact in machine.contacts_at(positions, pair)
         if contact.bodies[0] == "inner ring"
-    ]
-    largest = max(contact.load for contact in inner)
-    inner = [contact for contact in inner if contact.load > LEAST_LOAD * largest]
-    angles = np.array([contact.position for contact in inner])
-    return _cycle(
-        inner,
-        (angles - angles[0]) / machine.cage_speed,
-        machine.place,
-        continuous=len(inner) == len(positions),
+    }
+    largest = max(contact.load for contact in inner.values())
+    loaded = np.array(
+        [
+            position in inner and inner[position].load > LEAST_LOAD * largest
+            for position in positions.tolist()
+        ]
     )
+    order = _zone(loaded, int(np.argmax([_load(inner.get(p)) for p in positions.tolist()])))
+    zone = [inner[positions[index % BEARING_ANGLES]] for index in order]
+    angles = 2.0 * math.pi / BEARING_ANGLES * (order - order[0])
+    if loaded.all():  # the element comes back to where it was
+        zone, angles = [*zone, zone[0]], np.append(angles, 2.0 * math.pi)
+    return _cycle(
+        zone,
+        angles / machine.cage_speed,
+        machine.place,
+        continuous=bool(loaded.all()),
+    )
+
+
+def _load(contact: MachineContact | None) -> float:
+    return 0.0 if contact is None else contact.load
+
+
+def _zone(loaded: npt.NDArray[np.bool_], heaviest: int) -> npt.NDArray[np.int_]:
+    """Return the successive indices of the loaded zone around the heaviest one, on a circle."""
+    count = len(loaded)
+    if loaded.all():
+        return np.arange(count)
+    begin, end = heaviest, heaviest
+    while loaded[(begin - 1) % count]:
+        begin -= 1
+    while loaded[(end + 1) % count]:
+        end += 1
+    return np.arange(begin, end + 1)
 
 
 def _tooth_distances(machine: SpurGear) -> Field:
@@ -121,9 +158,17 @@ def _tooth_times(machine: SpurGear, distances: Field) -> Field:
 
 
 def _cycle(
-    contacts: list[MachineContact], times: Field, place: str, *, continuous: bool = True
+    contacts: list[MachineContact],
+    times: Field,
+    place: str,
+    *,
+    continuous: bool = True,
+    carried: Field | None = None,
 ) -> MachineCycle:
-    """Return the cycle of successive contacts, with the largest line load of each."""
+    """Return the cycle of successive contacts, solved for the largest line load of each.
+
+    Energy and wear count the loads of the contacts, unless others are `carried`.
+    """
     loads = [
         contact.load if contact.line_load is None else contact.line_load * (contact.length or 0.0)
         for contact in contacts
@@ -137,9 +182,10 @@ def _cycle(
         loads=loads,
         speeds=[contact.surface_speeds for contact in contacts],
         radii=radii,
-        positions=[contact.position for contact in contacts],
+        positions=np.unwrap([contact.position for contact in contacts]),
         place=place,
         continuous=continuous,
+        carried=[contact.load for contact in contacts] if carried is None else carried,
     )
     moving = [contact for contact in contacts if not contact.stands_still]
     if not moving:

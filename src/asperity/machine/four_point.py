@@ -126,7 +126,11 @@ class FourPointBearing(BallBearingBase):
         along = shifts[1] + shifts[2] * np.cos(self.angles)
         compliances = np.array(self._compliances(pair))
         by_ring = []
-        for groove, share in zip(self.osculation, compliances / compliances.sum(), strict=True):
+        for groove, share in zip(
+            self.osculation,
+            compliances / compliances.sum(),
+            strict=True,
+        ):
             arm = (groove - 0.5) * self.ball_diameter
             sine, cosine = (arm * f(self.contact_angle) for f in (math.sin, math.cos))
             by_ring.append(
@@ -174,7 +178,14 @@ class FourPointBearing(BallBearingBase):
     def _rows(self, stiffness: float) -> tuple[BallRow, ...]:
         offset = self.groove_distance * math.sin(self.contact_angle)
         return tuple(
-            BallRow(self.angles, self.groove_distance, self.play, stiffness, side, offset)
+            BallRow(
+                self.angles,
+                self.groove_distance,
+                self.play,
+                stiffness,
+                side,
+                offset,
+            )
             for side in (1.0, -1.0)
         )
 

@@ -170,7 +170,15 @@ class TaperedRollerBearing:
         def excess(half_angle: float) -> float:
             return math.tan(half_angle) - ratio * math.sin(self.cup_angle - half_angle)
 
-        return float(scipy.optimize.brentq(excess, 0.0, self.cup_angle, xtol=1e-15, rtol=1e-14))
+        return float(
+            scipy.optimize.brentq(
+                excess,
+                0.0,
+                self.cup_angle,
+                xtol=1e-15,
+                rtol=1e-14,
+            )
+        )
 
     @property
     def roller_axis_angle(self) -> float:

@@ -8,6 +8,9 @@ from .curves import FrictionPoint as FrictionPoint
 from .curves import SolverProgress as SolverProgress
 from .curves import stribeck_curve as stribeck_curve
 from .curves import traction_curve as traction_curve
+from .depletion import PassRow as PassRow
+from .depletion import TrackDepletion as TrackDepletion
+from .depletion import deplete_case as deplete_case
 from .derived import Derived as Derived
 from .dynamic import FREQUENCIES as FREQUENCIES
 from .dynamic import DynamicBranch as DynamicBranch

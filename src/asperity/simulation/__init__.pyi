@@ -1,3 +1,4 @@
+from .cycle.film import FilmCourse as FilmCourse
 from .cycle.machine import machine_contact_cycle as machine_contact_cycle
 from .cycle.result import CycleInstant as CycleInstant
 from .cycle.result import CycleResult as CycleResult

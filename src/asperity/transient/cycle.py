@@ -14,7 +14,7 @@ from typing import get_args
 import numpy as np
 
 from asperity.contact.conditions import ContactConditions
-from asperity.contact.cycle import Instant, OperatingCycle, conditions_of
+from asperity.contact.cycle import CycleState, OperatingCycle, conditions_of
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput, require_choice, require_positive
 from asperity.ehl import MAX_CELLS_PER_TIME_STEP, Options, Scales, Start
@@ -22,7 +22,7 @@ from asperity.ehl.outcome import TWO_PRESSURES
 from asperity.ehl.problem_setup import contact_problem
 from asperity.lubricant import Lubricant
 from asperity.surface import MovingSurfaces, Surface
-from asperity.transient.time_step import Memory, Snapshot, TransientContact
+from asperity.transient.time_step import Memory, Snapshot, StepLength, TransientContact
 
 # cells that oil travels in a time step at least: without entrainment, the film is only squeezed
 LEAST_CELLS = 1e-3
@@ -39,14 +39,15 @@ PRESSURES, GAPS = ("pressure", "oil"), ("content", "content_before", "leant", "a
 class CycleMemory:
     """State of a contact for its next time step: fields in the units of its conditions.
 
-    `backwards` if x points against the positive direction of the speeds, `length` of the last step
-    [s].
+    `backwards` if x points against the positive direction of the speeds; `length` of the last step
+    [s], and the whole `cells` over which oil was followed in it, nan if it was not.
     """
 
     fields: Memory
     conditions: ContactConditions
     backwards: bool
     length: float
+    cells: float = math.nan
 
 
 def cycle_contact(
@@ -92,6 +93,10 @@ def cycle_contact(
             "a cycle is solved with enough oil, got an inlet layer; leave out [inlet], or solve "
             "steady contacts"
         )
+    if not np.all(np.diff(times) > 0.0):
+        raise BadInput(
+            "the times of a cycle's steps must increase; sort them, and leave out equal ones"
+        )
     marcher = _Marcher(cycle, contact, lubricant, surfaces, options)
     if isinstance(start, str):
         require_choice("start", start, get_args(Start))
@@ -102,7 +107,12 @@ def cycle_contact(
         memory = marcher.open_start(float(times[0]), start)
     if film_tolerance is None:
         for number, (begin, end) in enumerate(itertools.pairwise(times), 1):
-            snapshot, memory = marcher.step(number, memory, float(begin), float(end))
+            snapshot, memory = marcher.step(
+                number,
+                memory,
+                float(begin),
+                float(end),
+            )
             yield snapshot
     else:
         yield from _adaptive_steps(marcher, memory, times, film_tolerance)
@@ -173,24 +183,42 @@ class _Marcher:
 
     def steady_start(self, time: float, *, steady: bool) -> tuple[Snapshot, CycleMemory]:
         """Return the contact at the first time, steady or dry at rest, and its memory."""
-        instant = self.cycle.at(time)
+        instant = self.cycle.state(time)
         if steady and instant.entrainment_speed == 0.0:
             raise BadInput(
                 "the cycle begins without entrainment, which has no steady film; use start = "
                 '"stationary", or begin at another time'
             )
         backwards = instant.entrainment_speed < 0.0
-        conditions = self._conditions(instant, instant.speeds, backwards, math.inf)
+        conditions = self._conditions(
+            instant,
+            instant.speeds,
+            backwards,
+            math.inf,
+        )
         surface = self._surface(time, backwards)
-        snapshot = self._model(conditions, 1.0).start(surface, steady=steady)
+        length = StepLength(1.0, math.nan)
+        model = TransientContact(
+            conditions,
+            self.lubricant,
+            self.surfaces,
+            self.options,
+            length,
+        )
+        snapshot = model.start(surface, steady=steady)
         memory = CycleMemory(snapshot.memory, conditions, backwards, math.inf)
         return replace(snapshot, time=time, memory={}), memory
 
     def open_start(self, time: float, gap: float) -> CycleMemory:
         """Return the memory of undeformed bodies at a gap [m] that is full of oil."""
-        instant = self.cycle.at(time)
+        instant = self.cycle.state(time)
         backwards = instant.entrainment_speed < 0.0
-        conditions = self._conditions(instant, instant.speeds, backwards, math.inf)
+        conditions = self._conditions(
+            instant,
+            instant.speeds,
+            backwards,
+            math.inf,
+        )
         problem = contact_problem(
             conditions, self.lubricant, self._surface(time, backwards), self.options
         )
@@ -211,44 +239,61 @@ class _Marcher:
         self, number: int, memory: CycleMemory, begin: float, end: float
     ) -> tuple[Snapshot, CycleMemory]:
         """Return the contact at the end of a step, and its memory."""
-        length, instant = end - begin, self.cycle.at(end)
-        paths = [
-            after - before
-            for after, before in zip(
-                self.cycle.travelled(end), self.cycle.travelled(begin), strict=True
-            )
-        ]
+        instant, seconds = self.cycle.state(end), end - begin
+        paths = self._paths(begin, end)
         path = 0.5 * sum(paths)
-        cells = abs(path) / self.spacing
-        backwards = memory.backwards if cells < LEAST_CELLS else path < 0.0
-        speeds, whole = instant.speeds, self._whole(cells)
-        if whole is not None:  # at the mean speed of the step
-            shift = path / length - instant.entrainment_speed
-            speeds = (speeds[0] + shift, speeds[1] + shift)
-        conditions = self._conditions(instant, speeds, backwards, length)
-        model = self._model(
-            conditions,
-            length,
-            cells=math.nan if whole is None else float(whole),
-            ratio=1.0 if math.isinf(memory.length) else length / memory.length,
-            moved=round(_mean_rough(self.surfaces, paths, backwards) / self.spacing),
-        )
-        fields = _carried(
-            memory, self._scales(memory.conditions), self._scales(conditions), backwards
-        )
-        if model.ratio > MAX_RATIO:
-            fields.pop("content_before", None)
-        snapshot = model.step(number, fields, end, self._surface(end, backwards))
-        stated = self._conditions(instant, instant.speeds, backwards, length)
-        solution = replace(snapshot.solution, conditions=stated)
-        remembered = dict(snapshot.memory)
-        if "content_before" in fields and math.isfinite(memory.length):
-            remembered["content_last_but_one"] = fields["content_before"]
-        after = CycleMemory(remembered, conditions, backwards, length)
-        return replace(snapshot, solution=solution, memory={}), after
+        slow = abs(path) < LEAST_CELLS * self.spacing
+        backwards = memory.backwards if slow else path < 0.0
+        moved = round(_mean_rough(self.surfaces, paths, backwards) / self.spacing)
+        cells = self._whole(abs(path) / self.spacing)
+        length = StepLength(seconds, cells, _ratio(seconds, memory.length), moved)
+        speeds = instant.speeds if math.isnan(cells) else _mean_speeds(instant, path / seconds)
+        conditions = self._conditions(instant, speeds, backwards, seconds)
+        snapshot, after = self._solved(number, memory, conditions, length, end, backwards)
+        stated = self._conditions(instant, instant.speeds, backwards, seconds)
+        return _stating(snapshot, stated), after
 
-    def _whole(self, cells: float) -> int | None:
-        """Return the whole cells of a path along which oil can be followed; None otherwise."""
+    def _solved(
+        self,
+        number: int,
+        memory: CycleMemory,
+        conditions: ContactConditions,
+        length: StepLength,
+        end: float,
+        backwards: bool,
+    ) -> tuple[Snapshot, CycleMemory]:
+        """Solve a step of some conditions and length, and return the contact and its memory."""
+        fields = self._fields(memory, conditions, length, backwards)
+        model = TransientContact(conditions, self.lubricant, self.surfaces, self.options, length)
+        snapshot = model.step(number, fields, end, self._surface(end, backwards))
+        after = dict(snapshot.memory)
+        if "content_before" in fields and math.isfinite(memory.length):
+            after["content_last_but_one"] = fields["content_before"]
+        return snapshot, CycleMemory(after, conditions, backwards, length.seconds, length.cells)
+
+    def _fields(
+        self,
+        memory: CycleMemory,
+        conditions: ContactConditions,
+        length: StepLength,
+        backwards: bool,
+    ) -> dict[str, Field]:
+        """Return the fields of a memory for the next step."""
+        before, after = self._scales(memory.conditions), self._scales(conditions)
+        fields = _carried(memory, before, after, backwards)
+        if length.ratio > MAX_RATIO:
+            fields.pop("content_before", None)
+        if length.cells != memory.cells and "leant" in fields:  # of the last step's path
+            fields["leant"] = np.zeros_like(fields["leant"])
+        return fields
+
+    def _paths(self, begin: float, end: float) -> list[float]:
+        """Return the paths of both bodies in a step [m]."""
+        travelled = (self.cycle.travelled(time) for time in (begin, end))
+        return [after - before for before, after in zip(*travelled, strict=True)]
+
+    def _whole(self, cells: float) -> float:
+        """Return the whole cells of a path along which oil can be followed; nan otherwise."""
         whole = round(cells)
         followed = (
             1 <= whole <= MAX_CELLS_PER_TIME_STEP
@@ -256,10 +301,10 @@ class _Marcher:
             and self.options.model in TWO_PRESSURES
             and any(self.surfaces.rough)
         )
-        return whole if followed else None
+        return float(whole) if followed else math.nan
 
     def _conditions(
-        self, instant: Instant, speeds: tuple[float, float], backwards: bool, length: float
+        self, instant: CycleState, speeds: tuple[float, float], backwards: bool, length: float
     ) -> ContactConditions:
         """Return the conditions of a step; x points with the oil, which moves a little at least."""
         side = -1.0 if backwards else 1.0
@@ -267,26 +312,10 @@ class _Marcher:
         lift = max(LEAST_CELLS * self.spacing / length - 0.5 * (first + second), 0.0)
         if math.isinf(length) and first + second == 0.0:
             lift = LEAST_SPEED  # at rest, where the contact is dry
-        return conditions_of(instant, self.contact, (first + lift, second + lift))
-
-    def _model(
-        self,
-        conditions: ContactConditions,
-        seconds: float,
-        *,
-        cells: float = math.nan,
-        ratio: float = 1.0,
-        moved: int = 0,
-    ) -> TransientContact:
-        return TransientContact(
-            conditions,
-            self.lubricant,
-            self.surfaces,
-            self.options,
-            seconds,
-            cells,
-            ratio=ratio,
-            moved=moved,
+        return conditions_of(
+            instant,
+            self.contact,
+            (first + lift, second + lift),
         )
 
     def _scales(self, conditions: ContactConditions) -> Scales:
@@ -296,6 +325,23 @@ class _Marcher:
         """Return the roughness at a time, x in the direction of the oil."""
         surface = self.surfaces.composite_displaced(self.cycle.travelled(time))
         return Surface(surface.heights[::-1].copy(), surface.grid) if backwards else surface
+
+
+def _ratio(seconds: float, before: float) -> float:
+    """Return the length of a step over that of the step before; 1 for the first."""
+    return 1.0 if math.isinf(before) else seconds / before
+
+
+def _stating(snapshot: Snapshot, conditions: ContactConditions) -> Snapshot:
+    """Return a snapshot with the conditions of its instant, without its memory."""
+    solution = replace(snapshot.solution, conditions=conditions)
+    return replace(snapshot, solution=solution, memory={})
+
+
+def _mean_speeds(instant: CycleState, mean: float) -> tuple[float, float]:
+    """Return the speeds of an instant [m/s], shifted to another entrainment speed."""
+    shift = mean - instant.entrainment_speed
+    return instant.speeds[0] + shift, instant.speeds[1] + shift
 
 
 def _carried(
@@ -310,7 +356,13 @@ def _carried(
             factor = units[0] / units[1]
             # the signed unknown of conserved oil is a share below zero
             field = (
-                np.where(field < 0.0, field, factor * field) if name == "oil" else factor * field
+                np.where(
+                    field < 0.0,
+                    field,
+                    factor * field,
+                )
+                if name == "oil"
+                else factor * field
             )
         fields[name] = field[::-1] if field.ndim and backwards != memory.backwards else field
     return fields
@@ -318,5 +370,13 @@ def _carried(
 
 def _mean_rough(surfaces: MovingSurfaces, paths: list[float], backwards: bool) -> float:
     """Return the mean path of the rough bodies in a step [m], in the direction of x."""
-    rough = [path for path, is_rough in zip(paths, surfaces.rough, strict=True) if is_rough]
+    rough = [
+        path
+        for path, is_rough in zip(
+            paths,
+            surfaces.rough,
+            strict=True,
+        )
+        if is_rough
+    ]
     return (-1.0 if backwards else 1.0) * sum(rough) / max(len(rough), 1)

@@ -12,7 +12,7 @@ from asperity.core.errors import BadInput, require_positive
 from asperity.ehl import MAX_CELLS_PER_TIME_STEP, Options, Start
 from asperity.lubricant import Lubricant
 from asperity.surface import MovingSurfaces
-from asperity.transient.time_step import Memory, Snapshot, TransientContact
+from asperity.transient.time_step import Memory, Snapshot, StepLength, TransientContact
 
 Steps = Callable[..., Iterator[Snapshot]]  # interface of a transient model
 
@@ -67,8 +67,7 @@ def moving_contact(
         lubricant,
         surfaces,
         options or Options(),
-        seconds,
-        time_step,
+        StepLength(seconds, time_step),
         viscosity_factor=viscosity_factor,
         flattening=flattening,
     )

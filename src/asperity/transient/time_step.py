@@ -10,6 +10,7 @@ discretise time and wedge separately.
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -81,12 +82,21 @@ class Snapshot:
         }
 
 
-class TransientContact:
-    """A contact of constant conditions, and its time step of `seconds`.
+class StepLength(NamedTuple):
+    """Length of a time step [s], in which the oil travels `cells`.
 
-    In a step the oil travels `cells`, and is followed if they are whole; `moved` are the cells by
-    which roughness moves. `ratio` is the step's length over that of the step before.
+    It is followed if they are whole. `ratio` is that of the length to the step before, and `moved`
+    are the cells by which roughness moves, None for those of its speed.
     """
+
+    seconds: float
+    cells: float
+    ratio: float = 1.0
+    moved: int | None = None
+
+
+class TransientContact:
+    """A contact of constant conditions, and its time step."""
 
     def __init__(
         self,
@@ -94,11 +104,8 @@ class TransientContact:
         lubricant: Lubricant,
         surfaces: MovingSurfaces,
         options: Options,
-        seconds: float,
-        cells: float,
+        length: StepLength,
         *,
-        ratio: float = 1.0,
-        moved: int | None = None,
         viscosity_factor: Field | None = None,
         flattening: bool = False,
     ) -> None:
@@ -106,8 +113,8 @@ class TransientContact:
         self.options, self.flattening = options, flattening
         self.viscosity_factor = viscosity_factor
         self.scales = Scales.from_conditions(conditions, lubricant)
-        self.seconds, self.ratio = seconds, ratio
-        self.length = self.seconds * conditions.entrainment_speed / self.scales.length
+        seconds, cells, self.ratio, moved = length
+        self.length = seconds * conditions.entrainment_speed / self.scales.length
         self.one_line = surfaces.uniform and conditions.endless
         rough = any(surfaces.rough)
         # shares of the bodies in the flattening

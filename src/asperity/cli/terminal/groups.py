@@ -8,7 +8,10 @@ from typer.core import TyperGroup
 
 GROUPS = {
     "First steps": ("demo", "new", "page"),
-    "One contact": ("solve", "run", "wear", "stribeck", "traction", "vibrate", "observe"),
+    "One contact": (
+        *("solve", "cycle", "deplete", "run", "wear"),
+        *("stribeck", "traction", "vibrate", "observe"),
+    ),
     "Machines and studies": ("machine", "study", "sensitivity", "calibrate"),
     "Surfaces and recordings": ("surface", "check", "track", "watch", "store", "infer"),
     "Saved results": ("report", "export"),

@@ -4,7 +4,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from asperity.core.arrays import Field
 from asperity.core.quantities import quantity
 from asperity.report.base import Exhibit
 from asperity.report.drawing import display, name_axes
@@ -23,24 +22,11 @@ def over_cycle(result: CycleResult) -> Exhibit:
         count = 3 + len(drawn)
         figure = Figure(figsize=(medium.double, 1.45 * count + 0.5), layout="constrained")
         panels = figure.subplots(count, 1, sharex=True)
-        time, shown = result.film.times, display(TIME, result.film.times)
-        states = [result.cycle.at(float(moment)) for moment in time]
-        _line(panels[0], shown, "load_n", np.array([state.load for state in states]))
-        for key, colour, style in (
-            ("entrainment_speed_m_s", BLUE, "-"),
-            ("sliding_speed_m_s", VERMILION, "--"),
-        ):
-            values = np.array([getattr(state, key.removesuffix("_m_s")) for state in states])
-            panels[1].plot(
-                shown, display(key, values), style, color=colour, label=quantity(key).name
-            )
-        panels[1].set_ylabel("speed [m/s]")
-        panels[1].axhline(0.0, color=GREY, linewidth=0.6)
-        panels[1].legend(ncols=2)
-        _films(panels[2], result, shown)
+        _conditions(panels[0], panels[1], result)
+        _films(panels[2], result)
         for key, axes in zip(drawn, panels[3:], strict=True):
             _of_instants(axes, result, key)
-        panels[0].set_xlim(float(shown[0]), float(shown[-1]))
+        panels[0].set_xlim(0.0, float(display(TIME, np.array([result.cycle.period]))[0]))
         name_axes(panels[-1], TIME)
         return figure
 
@@ -58,23 +44,54 @@ def _has(result: CycleResult, key: str) -> bool:
     return any(np.isfinite(instant.numbers.get(key, np.nan)) for instant in result.solved)
 
 
-def _line(axes: Axes, shown: Field, key: str, values: Field) -> None:
-    axes.plot(shown, display(key, values), color=BLUE)
-    axes.set_ylabel(quantity(key).label)
+def _conditions(of_load: Axes, of_speeds: Axes, result: CycleResult) -> None:
+    """Draw the load, and the speeds of entrainment and sliding."""
+    shown = display(TIME, result.film.times)
+    states = [result.cycle.state(float(moment)) for moment in result.film.times]
+    loads = np.array([state.load for state in states])
+    of_load.plot(shown, display("load_n", loads), color=BLUE)
+    of_load.set_ylabel(quantity("load_n").label)
+    for key, colour, style in (
+        ("entrainment_speed_m_s", BLUE, "-"),
+        ("sliding_speed_m_s", VERMILION, "--"),
+    ):
+        values = np.array([getattr(state, key.removesuffix("_m_s")) for state in states])
+        of_speeds.plot(
+            shown,
+            display(key, values),
+            style,
+            color=colour,
+            label=quantity(key).name,
+        )
+    of_speeds.set_ylabel("speed [m/s]")
+    of_speeds.axhline(0.0, color=GREY, linewidth=0.6)
+    of_speeds.legend(ncols=2)
 
 
-def _films(axes: Axes, result: CycleResult, shown: Field) -> None:
+def _films(axes: Axes, result: CycleResult) -> None:
     """Draw both films in time, and the steady ones as circles."""
-    moments = display(TIME, result.steady_times)
+    shown, moments = display(TIME, result.film.times), display(TIME, result.steady_times)
     for index, (key, values, colour) in enumerate(
         (
             ("h_central_m", result.film.h_central, BLUE),
             ("h_min_m", result.film.h_min, VERMILION),
         )
     ):
-        axes.semilogy(shown, display(key, values), color=colour, label=quantity(key).name)
+        axes.semilogy(
+            shown,
+            display(key, values),
+            color=colour,
+            label=quantity(key).name,
+        )
         steady = np.array([films[index] for films in result.steady])
-        axes.plot(moments, display(key, steady), "o", color=colour, fillstyle="none", markersize=4)
+        axes.plot(
+            moments,
+            display(key, steady),
+            "o",
+            color=colour,
+            fillstyle="none",
+            markersize=4,
+        )
     axes.set_ylabel(quantity("film_thickness_m").label)
     axes.legend(ncols=2)
 
@@ -84,11 +101,20 @@ def _of_instants(axes: Axes, result: CycleResult, key: str) -> None:
     known = [instant for instant in result.solved if np.isfinite(instant.numbers.get(key, np.nan))]
     moments = display(TIME, np.array([instant.time for instant in known]))
     values = np.array([instant.numbers[key] for instant in known])
-    axes.plot(moments, display(key, values), "-s", color=BLUE, markersize=3.5, linewidth=0.8)
+    axes.plot(
+        moments,
+        display(key, values),
+        "-s",
+        color=BLUE,
+        markersize=3.5,
+        linewidth=0.8,
+    )
     for instant, moment in zip(known, moments, strict=True):
         low, high = instant.interval(key)
-        if low is not None and high is not None:
-            axes.plot([moment, moment], display(key, np.array([low, high])), color=BLUE)
+        if low is None or high is None:
+            continue
+        ends = display(key, np.array([low, high]))
+        axes.plot([moment, moment], ends, color=BLUE)
     axes.set_ylabel(quantity(key).label)
     axes.set_ylim(bottom=0.0)
 

@@ -10,7 +10,7 @@ from asperity.contact.conditions import ContactConditions
 from asperity.contact.cycle import OperatingCycle
 from asperity.contact.grid import Grid
 from asperity.core.arrays import Field
-from asperity.core.errors import AsperityError
+from asperity.core.errors import AsperityError, BadInput
 from asperity.ehl import Options, auto_grid, solve_contact
 from asperity.lubricant import Lubricant
 from asperity.surface import MovingSurfaces, flat_surface
@@ -24,7 +24,27 @@ SLOW = 0.05  # of the largest entrainment speed, below which an instant does not
 MAX_LINE_CELLS, MAX_CELLS = 720, 12_000  # of a line contact along x; of others
 CLOSED = 0.01  # relative difference of films one period apart, at which a cycle has settled
 MAX_PERIODS = 3
+EQUAL = 1e-9  # of the period, below which two times are the same
 MAX_OUTPUTS = 400  # times at which the film is stored
+
+
+@dataclass(frozen=True)
+class SmoothContact:
+    """Smooth contact over a cycle, with the settings of its solution.
+
+    `start` as of `cycle_contact`, for a cycle that does not repeat; `outputs` are the times of the
+    result [s], by default those of the cycle's table, at most 400; `film_tolerance` of a time step;
+    `measure` returns further numbers of an output.
+    """
+
+    cycle: OperatingCycle
+    contact: ContactConditions
+    lubricant: Lubricant
+    start: str | float = "steady"
+    outputs: Field | None = None
+    options: Options | None = None
+    film_tolerance: float = FILM_TOLERANCE
+    measure: Callable[[Snapshot], Mapping[str, float]] | None = None
 
 
 @dataclass(frozen=True)
@@ -49,7 +69,7 @@ class FilmCourse:
     closure: float | None
     grid: Grid
 
-    def at(self, name: str, times: Field) -> Field:
+    def interpolated(self, name: str, times: Field) -> Field:
         """Return one of the fields at other times, interpolated."""
         values: Field = np.interp(times, self.times, getattr(self, name))
         return values
@@ -61,33 +81,56 @@ def cycle_grid(cycle: OperatingCycle, contact: ContactConditions, lubricant: Lub
     It extends over the automatic grids of instants that entrain oil, with the cells of the finest
     one as far as their number allows, and is symmetric along x where oil turns round.
     """
-    times = np.linspace(0.0, cycle.period, GRID_SAMPLES + 1)
-    instants = [cycle.at(float(time)) for time in times]
-    speeds = np.array([abs(instant.entrainment_speed) for instant in instants])
-    fast = [time for time, speed in zip(times, speeds, strict=True) if speed > SLOW * speeds.max()]
-    grids = [auto_grid(cycle.conditions(float(time), contact), lubricant) for time in fast]
-    heaviest = max(cycle.conditions(float(time), contact).hertz.half_widths for time in fast)
-    low = min(min(grid.lower[0] for grid in grids), -2.0 * heaviest[0])
-    high = max(max(grid.upper[0] for grid in grids), 1.5 * heaviest[0])
-    if cycle.reverses:
-        low, high = -max(-low, high), max(-low, high)
-    dx = min(grid.spacing[0] for grid in grids)
+    grids = [auto_grid(conditions, lubricant) for conditions in _entraining(cycle, contact)]
+    every = (cycle.conditions(float(time), contact) for time in cycle.times)
+    widest = max(conditions.hertz.half_widths[0] for conditions in every)
+    low, high = _range_x(grids, widest, symmetric=cycle.reverses)
+    nx = (high - low) / min(grid.spacing[0] for grid in grids)
     if contact.endless:
-        nx = 2 * math.ceil(min((high - low) / dx, MAX_LINE_CELLS) / 2.0)
         first = grids[0]
-        return Grid(
-            (nx, first.cells[1]),
-            (low, first.lower[1]),
-            (high, first.upper[1]),
-            periodic=(False, True),
+        cells = _even(min(nx, MAX_LINE_CELLS)), first.cells[1]
+        return replace(
+            first, cells=cells, lower=(low, first.lower[1]), upper=(high, first.upper[1])
         )
-    front = min(grid.lower[1] for grid in grids)
-    back = max(grid.upper[1] for grid in grids)
-    dy = min(grid.spacing[1] for grid in grids)
-    counts = (high - low) / dx, (back - front) / dy
-    fewer = min(1.0, math.sqrt(MAX_CELLS / (counts[0] * counts[1])))
-    nx, ny = (2 * math.ceil(fewer * count / 2.0) for count in counts)
-    return Grid((nx, ny), (low, front), (high, back), periodic=(False, False))
+    front, back = min(grid.lower[1] for grid in grids), max(grid.upper[1] for grid in grids)
+    ny = (back - front) / min(grid.spacing[1] for grid in grids)
+    fewer = min(1.0, math.sqrt(MAX_CELLS / (nx * ny)))
+    cells = _even(fewer * nx), _even(fewer * ny)
+    return Grid(cells, (low, front), (high, back), periodic=(False, False))
+
+
+def _range_x(grids: list[Grid], widest: float, *, symmetric: bool) -> tuple[float, float]:
+    """Return the ends along x [m] of grids and of the widest contact."""
+    low = min(*(grid.lower[0] for grid in grids), -2.0 * widest)
+    high = max(*(grid.upper[0] for grid in grids), 1.5 * widest)
+    if symmetric:
+        reach = max(-low, high)
+        return -reach, reach
+    return low, high
+
+
+def _even(count: float) -> int:
+    return 2 * math.ceil(0.5 * count)
+
+
+def _entraining(cycle: OperatingCycle, contact: ContactConditions) -> list[ContactConditions]:
+    """Return the conditions of instants that entrain oil fast enough to decide a grid."""
+    rows = np.asarray(cycle.times, float)
+    peaks = rows[[np.argmax(cycle.loads), np.argmin(cycle.loads), np.argmin(cycle.radii)]]
+    spread = (
+        np.linspace(
+            0.0,
+            cycle.period,
+            GRID_SAMPLES + 1,
+        ),
+        cycle.even_times(GRID_SAMPLES),
+    )
+    times = np.unique(np.concatenate([*spread, peaks]))
+    speeds = np.array([abs(cycle.state(float(time)).entrainment_speed) for time in times])
+    if not speeds.any():
+        raise BadInput("the cycle entrains no oil at any time; correct its speeds")
+    fast = times[speeds > SLOW * speeds.max()]
+    return [cycle.conditions(float(time), contact) for time in fast]
 
 
 def half_the_cells(grid: Grid) -> Grid:
@@ -103,16 +146,9 @@ def smooth_surfaces(grid: Grid) -> MovingSurfaces:
 
 
 def film_course(
-    cycle: OperatingCycle,
-    contact: ContactConditions,
-    lubricant: Lubricant,
+    smooth: SmoothContact,
     *,
-    start: str | float = "steady",
-    outputs: Field | None = None,
-    options: Options | None = None,
-    film_tolerance: float = FILM_TOLERANCE,
     grid: Grid | None = None,
-    measure: Callable[[Snapshot], Mapping[str, float]] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> FilmCourse:
     """Solve the smooth contact over a cycle in time.
@@ -121,13 +157,8 @@ def film_course(
 
     Parameters
     ----------
-    cycle, contact, lubricant : as `cycle_contact`
-    start : as `cycle_contact`, of a cycle that does not repeat
-    outputs : times of the result [s]; default: those of the cycle's table, at most 400
-    options : solver settings
-    film_tolerance : of a time step
+    smooth : contact and cycle
     grid : default `cycle_grid`
-    measure : returns further numbers of an output
     progress : called after each step with the share of a period done
 
     Raises
@@ -135,62 +166,102 @@ def film_course(
     BadInput
         as `cycle_contact`.
     """
-    grid = grid or cycle_grid(cycle, contact, lubricant)
-    outputs = default_outputs(cycle) if outputs is None else outputs
-    begin = 0.0
-    if cycle.repeats:
-        begin = max(map(float, outputs), key=lambda time: abs(cycle.at(time).entrainment_speed))
-        outputs = np.unique(outputs[outputs < cycle.period])
-    first = [time for time in outputs if time > begin]
-    wrapped = [time + cycle.period for time in outputs if time <= begin] if cycle.repeats else []
-    of_period = np.array([*first, *wrapped])
-    periods = MAX_PERIODS if cycle.repeats else 1
-    marks = np.concatenate([of_period + number * cycle.period for number in range(periods)])
-    wanted = {begin, *marks}
-    rows: dict[float, dict[str, float]] = {}
-    worst, steps, failed, done, closure = 0.0, 0, 0, 1, None
+    grid = grid or cycle_grid(smooth.cycle, smooth.contact, smooth.lubricant)
+    record, repeats = _Record(smooth), smooth.cycle.repeats
     for snapshot in cycle_contact(
-        cycle,
-        contact,
-        lubricant,
+        smooth.cycle,
+        smooth.contact,
+        smooth.lubricant,
         smooth_surfaces(grid),
-        np.array([begin, *marks]),
-        start=start if not cycle.repeats else "steady",
-        film_tolerance=film_tolerance,
-        options=options,
+        record.times,
+        start="steady" if repeats else smooth.start,
+        film_tolerance=smooth.film_tolerance,
+        options=smooth.options,
     ):
-        state, time = snapshot.state, snapshot.time
-        steps += 1
-        failed += not snapshot.solution.convergence.converged
-        worst = max(worst, abs(state.load_error))
-        if time in wanted:
-            films = {"h_central": state.h_central, "h_min": state.h_min, "p_max": state.p_max}
-            rows[time] = {**films, **({} if measure is None else measure(snapshot))}
+        record.add(snapshot)
         if progress is not None:
-            progress((time - begin) / cycle.period)
-        if cycle.repeats and time == marks[done * len(of_period) - 1]:
-            before = rows[begin if done == 1 else marks[(done - 1) * len(of_period) - 1]]
-            closure = abs(rows[time]["h_min"] / before["h_min"] - 1.0)
-            if done == periods or closure <= CLOSED:
-                break
-            done += 1
-    last = (done - 1) * cycle.period if cycle.repeats else 0.0
-    kept = {} if cycle.repeats or begin not in rows else {begin: rows[begin]}
-    kept |= {time: rows[time + last] for time in of_period}
-    times, columns = _in_order(kept, cycle)
-    return FilmCourse(
-        times=times,
-        h_central=columns.pop("h_central"),
-        h_min=columns.pop("h_min"),
-        p_max=columns.pop("p_max"),
-        measured=columns,
-        load_error=worst,
-        steps=steps,
-        failed=failed,
-        periods=done,
-        closure=closure,
-        grid=grid,
-    )
+            progress((snapshot.time - record.begin) / smooth.cycle.period)
+        if record.settled:
+            break
+    return record.course(grid)
+
+
+class _Record:
+    """Films at the outputs of a cycle, over as many periods as it takes to repeat."""
+
+    def __init__(self, smooth: SmoothContact) -> None:
+        self.smooth, self.cycle = smooth, smooth.cycle
+        outputs = default_outputs(self.cycle) if smooth.outputs is None else smooth.outputs
+        self.begin = 0.0
+        if self.cycle.repeats:
+            self.begin = max(
+                map(float, outputs), key=lambda time: abs(self.cycle.state(time).entrainment_speed)
+            )
+            outputs = outputs[outputs < self.cycle.period * (1.0 - EQUAL)]
+        later = [time for time in outputs if time > self.begin]
+        earlier = [time + self.cycle.period for time in outputs if time <= self.begin]
+        self.of_period = np.array([*later, *(earlier if self.cycle.repeats else [])])
+        periods = np.arange(MAX_PERIODS if self.cycle.repeats else 1)
+        following = (self.of_period + self.cycle.period * periods[:, None]).ravel()
+        self.times = np.concatenate([[self.begin], following])
+        self.due = {*self.times.tolist()}
+        self.rows: dict[float, dict[str, float]] = {}
+        self.load_error, self.steps, self.failed = 0.0, 0, 0
+        self.periods, self.settled = 1, False
+        self.closure: float | None = None
+
+    def add(self, snapshot: Snapshot) -> None:
+        """Add a time step."""
+        state, time, measure = snapshot.state, snapshot.time, self.smooth.measure
+        self.steps += 1
+        self.failed += not snapshot.solution.convergence.converged
+        self.load_error = max(self.load_error, abs(state.load_error))
+        if time not in self.due:
+            return
+        films = {"h_central": state.h_central, "h_min": state.h_min, "p_max": state.p_max}
+        self.rows[time] = {**films, **({} if measure is None else measure(snapshot))}
+        if self.cycle.repeats and time == self._end(self.periods):
+            before = self.begin if self.periods == 1 else self._end(self.periods - 1)
+            change = self.rows[time]["h_min"] / self.rows[before]["h_min"] - 1.0
+            self.closure = abs(change)
+            self.settled = self.periods == MAX_PERIODS or self.closure <= CLOSED
+            self.periods += not self.settled
+
+    def course(self, grid: Grid) -> FilmCourse:
+        """Return the films of the last period in the order of time, both ends included."""
+        last = (self.periods - 1) * self.cycle.period if self.cycle.repeats else 0.0
+        kept = {time: self.rows[time + last] for time in self.of_period.tolist()}
+        if not self.cycle.repeats and self.begin in self.rows:
+            kept[self.begin] = self.rows[self.begin]
+        period = self.cycle.period if self.cycle.repeats else math.inf
+        rows = sorted(((time % period, row) for time, row in kept.items()), key=lambda row: row[0])
+        if self.cycle.repeats:
+            rows.append((rows[0][0] + period, rows[0][1]))
+        columns = {name: np.array([row[name] for _, row in rows]) for name in rows[0][1]}
+        return FilmCourse(
+            times=np.array([time for time, _ in rows]),
+            h_central=columns.pop("h_central"),
+            h_min=columns.pop("h_min"),
+            p_max=columns.pop("p_max"),
+            measured=columns,
+            load_error=self.load_error,
+            steps=self.steps,
+            failed=self.failed,
+            periods=self.periods,
+            closure=self.closure,
+            grid=grid,
+        )
+
+    def _end(self, periods: int) -> float:
+        """Return the last output of some periods."""
+        return float(self.times[periods * len(self.of_period)])
+
+
+def merged(*times: Field, period: float) -> Field:
+    """Return times in order, without those that are equal but for rounding."""
+    union = np.unique(np.concatenate(times))
+    distinct: Field = union[np.diff(union, prepend=-np.inf) > EQUAL * period]
+    return distinct
 
 
 def default_outputs(cycle: OperatingCycle) -> Field:
@@ -199,20 +270,16 @@ def default_outputs(cycle: OperatingCycle) -> Field:
     return times if len(times) <= MAX_OUTPUTS else cycle.even_times(MAX_OUTPUTS - 1)
 
 
-def steady_films(
-    cycle: OperatingCycle,
-    contact: ContactConditions,
-    lubricant: Lubricant,
-    grid: Grid,
-    times: Field,
-    options: Options | None = None,
-) -> list[tuple[float, float]]:
+def steady_films(smooth: SmoothContact, grid: Grid, times: Field) -> list[tuple[float, float]]:
     """Return central and minimum film [m] of the steady smooth contact; nan where there is none."""
     films, surface = [], flat_surface(grid)
     for time in times:
         try:
             solution = solve_contact(
-                cycle.conditions(float(time), contact), lubricant, surface, options=options
+                smooth.cycle.conditions(float(time), smooth.contact),
+                smooth.lubricant,
+                surface,
+                options=smooth.options,
             )
         except AsperityError:  # no entrainment, or not converged
             films.append((math.nan, math.nan))
@@ -220,15 +287,3 @@ def steady_films(
         centre = int(np.argmin(np.abs(grid.x)))
         films.append((float(solution.gap[centre, grid.cells[1] // 2]), float(solution.gap.min())))
     return films
-
-
-def _in_order(
-    kept: Mapping[float, Mapping[str, float]], cycle: OperatingCycle
-) -> tuple[Field, dict[str, Field]]:
-    """Return times and columns of a period in the order of time, both ends included."""
-    turned = {time % cycle.period if cycle.repeats else time: row for time, row in kept.items()}
-    rows = sorted(turned.items(), key=lambda entry: entry[0])
-    if cycle.repeats:
-        rows.append((rows[0][0] + cycle.period, rows[0][1]))
-    columns = {name: np.array([row[name] for _, row in rows]) for name in rows[0][1]}
-    return np.array([time for time, _ in rows]), columns

@@ -18,7 +18,7 @@ from asperity.contact.conditions import ContactConditions
 from asperity.contact.cycle import OperatingCycle, conditions_of
 from asperity.core.arrays import Field
 from asperity.core.errors import AsperityError
-from asperity.ehl import half_as_many
+from asperity.ehl import Options, half_as_many
 from asperity.solution import flash_temperature, friction
 from asperity.surface import MovingSurfaces
 from asperity.transient import Snapshot, cycle_contact
@@ -83,7 +83,7 @@ def case_at(case: Case, cycle: OperatingCycle, time: float) -> tuple[Case, float
             "contact.load": widest.load,
             "contact.radius": [*radius] if isinstance(radius, tuple) else radius,
             "contact.entrainment_speed": max(
-                abs(cycle.at(time).entrainment_speed), SLOW * float(speeds.max())
+                abs(cycle.state(time).entrainment_speed), SLOW * float(speeds.max())
             ),
             "contact.slip": 0.0,
         }
@@ -93,19 +93,44 @@ def case_at(case: Case, cycle: OperatingCycle, time: float) -> tuple[Case, float
 
 def conditions_at(case: Case, cycle: OperatingCycle, time: float) -> ContactConditions:
     """Return load and radius of an instant, with the speeds of the case."""
-    return conditions_of(cycle.at(time), case.conditions, case.conditions.surface_speeds)
+    return conditions_of(
+        cycle.state(time),
+        case.conditions,
+        case.conditions.surface_speeds,
+    )
 
 
-def window_times(cycle: OperatingCycle, time: float, spacing: float, half_width: float) -> Field:
+def window_times(
+    cycle: OperatingCycle,
+    time: float,
+    spacing: float,
+    half_width: float,
+    first: float = -math.inf,
+) -> Field:
     """Return the times of the steps around an instant, which is one of them.
 
     The oil travels two cells or one in a step, or roughness one cell relative to it, and no step
-    is longer than 1/200 of the period.
+    is longer than 1/200 of the period. Before the `first` time [s] there are none; outside a cycle
+    that does not repeat, conditions are those of its ends.
     """
     after = 0.5 * AVERAGED * half_width
     lead = 2.0 * LEAD * half_width + after
-    before = _walk(cycle, time, spacing, lead, -1.0)
-    return np.array([*before[::-1], time, *_walk(cycle, time, spacing, after, 1.0)])
+    before = [
+        earlier
+        for earlier in _walk(
+            cycle,
+            time,
+            spacing,
+            lead,
+            -1.0,
+        )
+        if earlier > first
+    ]
+    starts = [first] if first > -math.inf and (not before or before[-1] > first) else []
+    if starts == [time]:
+        starts = []
+    later = _walk(cycle, time, spacing, after, 1.0)
+    return np.array([*starts, *before[::-1], time, *later])
 
 
 def _walk(
@@ -116,9 +141,6 @@ def _walk(
     while travelled < path and len(times) < MAX_STEPS:
         step = _step(cycle, now, spacing, direction)
         then = now + direction * step
-        if not cycle.repeats and not 0.0 <= then <= cycle.period:
-            end = 0.0 if direction < 0.0 else cycle.period
-            return [*times, end] if abs(end - now) > 1e-9 * cycle.period else times
         travelled += abs(_paths(cycle, now, then)[0])
         times.append(then)
         now = then
@@ -134,11 +156,25 @@ def _step(cycle: OperatingCycle, time: float, spacing: float, direction: float) 
         return abs(oil) <= cells * spacing and 0.5 * abs(slid) <= sliding_cells * spacing
 
     for cells in (CELLS, 1.0):
-        length = _longest(partial(within, cells=cells, sliding_cells=CELLS), longest)
+        length = _longest(
+            partial(
+                within,
+                cells=cells,
+                sliding_cells=CELLS,
+            ),
+            longest,
+        )
         oil, _ = _paths(cycle, time, time + direction * length)
         if abs(abs(oil) / spacing - cells) < WHOLE:
             return length
-    return _longest(partial(within, cells=1.0, sliding_cells=SLIDING_CELLS), longest)
+    return _longest(
+        partial(
+            within,
+            cells=1.0,
+            sliding_cells=SLIDING_CELLS,
+        ),
+        longest,
+    )
 
 
 def _longest(allowed: Callable[[float], bool], longest: float) -> float:
@@ -173,35 +209,56 @@ def _solve(job: InstantJob) -> InstantRow:
     case, narrowing = case_at(job.case.on_surface(job.surface), cycle, time)
     surfaces = instant_surfaces(case, cycle, narrowing, coarse=job.coarse)
     half_width = case.conditions.hertz.half_widths[0]
-    times = window_times(cycle, time, surfaces.grid.spacing[0], half_width)
-    assert case.lubricant is not None
-    averaged = list[dict[str, float]]()
-    steps, failed, last = 0, 0, None
-    for snapshot in cycle_contact(
+    first = _first_time(job)
+    times = window_times(
         cycle,
-        case.conditions,
-        case.lubricant,
-        surfaces,
-        times,
-        start=_start(job, float(times[0])),
-        options=replace(case.options, tolerance=max(case.options.tolerance, STEP_TOLERANCE)),
-    ):
-        steps += 1
-        path = abs(_paths(cycle, time, snapshot.time)[0])
-        near = abs(snapshot.time - time) <= AVERAGED_TIME * cycle.period
-        if snapshot.time != time and not (near and path <= 0.5 * AVERAGED * half_width * 1.001):
-            continue
-        failed += not snapshot.solution.convergence.converged
-        averaged.append(_numbers(case, snapshot))
-        if snapshot.time == time:
-            last = snapshot
-    numbers = {key: float(np.mean([row[key] for row in averaged])) for key in averaged[0]}
-    assert last is not None
+        time,
+        surfaces.grid.spacing[0],
+        half_width,
+        first,
+    )
+    assert case.lubricant is not None
+    start, options = _start(job, float(times[0])), _step_options(case)
+    snapshots = cycle_contact(
+        cycle, case.conditions, case.lubricant, surfaces, times, start=start, options=options
+    )
+    averaged, failed = dict[float, Snapshot](), 0
+    for snapshot in snapshots:
+        if _is_averaged(cycle, time, snapshot.time, half_width):
+            averaged[snapshot.time] = snapshot
+            failed += not snapshot.solution.convergence.converged
+    last = averaged[time]
     if failed > MAX_FAILED * len(averaged):
-        return InstantRow({}, steps, failed, last.solution.convergence.explain())
+        return InstantRow(
+            {},
+            len(times),
+            failed,
+            last.solution.convergence.explain(),
+        )
+    numbers = _means(case, [*averaged.values()])
     if not job.coarse and job.surface == 0:
         numbers["flash_temperature_max_k"] = _flash(case, last)
-    return InstantRow(numbers, steps, failed)
+    return InstantRow(numbers, len(times), failed)
+
+
+def _means(case: Case, snapshots: list[Snapshot]) -> dict[str, float]:
+    """Return the means of all numbers over some steps."""
+    rows = [_numbers(case, snapshot) for snapshot in snapshots]
+    return {key: float(np.mean([row[key] for row in rows])) for key in rows[0]}
+
+
+def _step_options(case: Case) -> Options:
+    """Return the settings of a time step."""
+    return replace(case.options, tolerance=max(case.options.tolerance, STEP_TOLERANCE))
+
+
+def _is_averaged(cycle: OperatingCycle, time: float, other: float, half_width: float) -> bool:
+    """Return True for the instant, and for times whose numbers are averaged with it."""
+    if other == time:
+        return True
+    path = abs(_paths(cycle, time, other)[0])
+    soon = abs(other - time) <= AVERAGED_TIME * cycle.period
+    return soon and path <= 0.5 * AVERAGED * half_width * (1.0 + WHOLE)
 
 
 def instant_surfaces(
@@ -223,11 +280,16 @@ def instant_surfaces(
     return case.moving_surfaces(TRACK_LENGTHS).on_cells(cells)
 
 
+def _first_time(job: InstantJob) -> float:
+    """Return the time before which there are no steps [s]."""
+    return 0.0 if job.start == "stationary" and not job.cycle.repeats else -math.inf
+
+
 def _start(job: InstantJob, begin: float) -> str:
-    """Return how a simulation starts: steady, but as the cycle does at its beginning."""
+    """Return how a simulation starts: steady, but at rest where nothing is entrained."""
     if begin == 0.0 and not job.cycle.repeats:
         return job.start
-    return "stationary" if job.cycle.at(begin).entrainment_speed == 0.0 else "steady"
+    return "stationary" if job.cycle.state(begin).entrainment_speed == 0.0 else "steady"
 
 
 def _numbers(case: Case, snapshot: Snapshot) -> dict[str, float]:

@@ -14,6 +14,7 @@ from asperity.core.quantities import UNKNOWN
 from asperity.simulation.cycle.film import FilmCourse
 from asperity.wear import WearCoefficient
 
+STEP_ERROR = 0.02  # of a film by the time steps, the largest that half of them has changed
 FINE = 2000  # intervals of an integral over a cycle
 
 
@@ -70,7 +71,8 @@ class CycleResult(Displayed):
     `film` is the smooth contact in time, `coarse` the same with half of the cells
     (None if that was not solved), `steady` its
     steady central and minimum film [m] at the times of `instants`, which are the rough contact,
-    empty for smooth bodies. `seconds` of computing, `notes` are sentences for a reader.
+    empty for smooth bodies. `steady_thinnest` is the steady minimum film where the film in time is
+    thinnest, nan without entrainment. `seconds` of computing, `notes` are sentences for a reader.
     """
 
     case: Case
@@ -79,6 +81,7 @@ class CycleResult(Displayed):
     coarse: FilmCourse | None
     steady_times: Field
     steady: list[tuple[float, float]]
+    steady_thinnest: float
     instants: tuple[CycleInstant, ...]
     wear_coefficients: tuple[WearCoefficient, WearCoefficient] | None
     seconds: float
@@ -101,32 +104,40 @@ class CycleResult(Displayed):
         return float(self.film.times[index]), float(self.film.h_min[index])
 
     def film_interval(self, name: str, time: float) -> tuple[float | None, float | None]:
-        """Return the 90 % interval of a film at a time [s] by the cells of the grid [m]."""
+        """Return the 90 % interval of a film at a time [s] by cells and time steps [m]."""
         if self.coarse is None:
             return None, None
         value, other = (
-            float(course.at(name, np.array([time]))[0]) for course in (self.film, self.coarse)
+            float(course.interpolated(name, np.array([time]))[0])
+            for course in (self.film, self.coarse)
         )
-        error = abs(value - other)
+        error = math.hypot(value - other, STEP_ERROR * value)
         return max(value - error, 0.0), value + error
 
     @property
-    def steady_min(self) -> float | None:
-        """Smallest steady minimum film of the smooth contact [m]; None if there is none."""
-        values = [least for _, least in self.steady if math.isfinite(least)]
-        return min(values, default=None)
+    def touches(self) -> bool:
+        """True if the smooth bodies touch at a time, so that the film is the contact film."""
+        return self.thinnest[1] <= self.case.options.contact_film * (1.0 + 1e-6)
 
     def worst(self, key: str) -> CycleInstant | None:
         """Return the instant with the largest value of a number; None without one."""
         known = [
             instant for instant in self.solved if math.isfinite(instant.numbers.get(key, math.nan))
         ]
-        return max(known, key=lambda instant: instant.numbers[key], default=None)
+        return max(
+            known,
+            key=lambda instant: instant.numbers[key],
+            default=None,
+        )
 
     def over_time(self, key: str, times: Field, end: int | None = None) -> Field | None:
         """Return a number at some times between the instants, or the low (0) or high (1) `end`."""
         if key in self.film.measured and end is None:
-            course: Field = np.interp(times, self.film.times, self.film.measured[key])
+            course: Field = np.interp(
+                times,
+                self.film.times,
+                self.film.measured[key],
+            )
             return course
         if len(self.solved) < 2:
             return None
@@ -138,7 +149,12 @@ class CycleResult(Displayed):
             return None
         period = self.cycle.period if self.cycle.repeats else None
         known = [instant.time for instant in self.solved]
-        numbers: Field = np.interp(times, known, np.array(values, float), period=period)
+        numbers: Field = np.interp(
+            times,
+            known,
+            np.array(values, float),
+            period=period,
+        )
         return numbers
 
     @property
@@ -180,10 +196,20 @@ class CycleResult(Displayed):
     def _conditions(self) -> tuple[Field, Field, Field]:
         """Return times, loads [N] and sliding speeds [m/s], without sign, for integrals."""
         rows = np.asarray(self.cycle.times, float)
-        times = np.unique(np.concatenate([rows, np.linspace(0.0, self.cycle.period, FINE + 1)]))
-        instants = [self.cycle.at(float(time)) for time in times]
-        load = np.array([instant.load for instant in instants])
-        return times, load, np.array([abs(instant.sliding_speed) for instant in instants])
+        times = np.unique(
+            np.concatenate(
+                [
+                    rows,
+                    np.linspace(
+                        0.0,
+                        self.cycle.period,
+                        FINE + 1,
+                    ),
+                ]
+            )
+        )
+        _, sliding, load = self.cycle.columns(times)
+        return times, load, np.abs(sliding)
 
     def _total(self, key: str, factor: float) -> CycleTotal:
         """Return the integral of a share of the load times the sliding speed."""
@@ -202,7 +228,9 @@ class CycleResult(Displayed):
             return CycleTotal(value=total)
         low, high = (float(np.trapezoid(end * weight, times)) for end in ends if end is not None)
         coarse = self._with_half_the_instants(key, times)
-        change = 0.0 if coarse is None else abs(float(np.trapezoid(coarse * weight, times)) - total)
+        if coarse is None:  # the error of the interpolation is not known
+            return CycleTotal(value=total)
+        change = float(np.trapezoid(coarse * weight, times)) - total
         return CycleTotal(
             value=total,
             low=max(total - math.hypot(total - low, change), 0.0),
@@ -236,7 +264,7 @@ class CycleResult(Displayed):
             "h_min_low_m": self.film_interval("h_min", time)[0],
             "h_min_high_m": self.film_interval("h_min", time)[1],
             "h_min_time_s": time,
-            "h_min_steady_m": self.steady_min,
+            "h_min_steady_m": finite_or_none(self.steady_thinnest),
             "clr_max": None if worst is None else worst.numbers["clr"],
             "clr_max_low": share[0],
             "clr_max_high": share[1],
@@ -265,13 +293,13 @@ class CycleResult(Displayed):
         """Return a row per output time of the smooth contact."""
         rows: list[JsonObject] = []
         for index, time in enumerate(self.film.times):
-            instant = self.cycle.at(float(time))
+            instant = self.cycle.state(float(time))
             low, high = self.film_interval("h_min", float(time))
             rows.append(
                 {
                     "time_s": float(time),
                     **self._place(float(time)),
-                    "load_n": instant.load,
+                    "load_n": instant.carried,
                     "entrainment_speed_m_s": instant.entrainment_speed,
                     "sliding_speed_m_s": instant.sliding_speed,
                     "radius_m": instant.radius,
@@ -288,16 +316,20 @@ class CycleResult(Displayed):
         """Return a row per instant: rough contact, smooth film in time, and steady film."""
         rows: list[JsonObject] = []
         by_time = {instant.time: instant for instant in self.instants}
-        for time, (central, least) in zip(self.steady_times, self.steady, strict=True):
-            state = self.cycle.at(float(time))
+        for time, (central, least) in zip(
+            self.steady_times,
+            self.steady,
+            strict=True,
+        ):
+            state = self.cycle.state(float(time))
             row: JsonObject = {
                 "time_s": float(time),
                 **self._place(float(time)),
-                "load_n": state.load,
+                "load_n": state.carried,
                 "entrainment_speed_m_s": state.entrainment_speed,
                 "sliding_speed_m_s": state.sliding_speed,
-                "h_central_smooth_m": float(self.film.at("h_central", time)),
-                "h_min_smooth_m": float(self.film.at("h_min", time)),
+                "h_central_smooth_m": float(self.film.interpolated("h_central", time)),
+                "h_min_smooth_m": float(self.film.interpolated("h_min", time)),
                 "h_central_steady_m": finite_or_none(central),
                 "h_min_steady_m": finite_or_none(least),
             }
@@ -307,6 +339,23 @@ class CycleResult(Displayed):
             rows.append(row)
         return rows
 
+    def _film_text(self) -> str:
+        """Return a clause on the thinnest film of the smooth bodies."""
+        time, least = self.thinnest
+        if self.touches:
+            return f"the smooth bodies touch, at {_time_text(time)}"
+        thinner, thicker = self.film_interval("h_min", time)
+        interval = UNKNOWN
+        if thinner is not None and thicker is not None:
+            interval = f"{1e6 * thinner:.3g} to {1e6 * thicker:.3g} um"
+        steady = "there is no steady film"
+        if math.isfinite(self.steady_thinnest):
+            steady = f"steady: {1e6 * self.steady_thinnest:.3g} um"
+        return (
+            f"the film of the smooth bodies is at least {1e6 * least:.3g} um ({interval}; "
+            f"{steady}), at {_time_text(time)}"
+        )
+
     def _place(self, time: float) -> JsonObject:
         """Return where in a machine's cycle the contact is at a time [s]."""
         position = self.cycle.position(time)
@@ -314,18 +363,7 @@ class CycleResult(Displayed):
 
     def verdict(self) -> str:
         """Return one sentence: thinnest film with the steady one, largest load share, wear."""
-        time, least = self.thinnest
-        steady = self.steady_min
-        thinner, thicker = self.film_interval("h_min", time)
-        interval = UNKNOWN
-        if thinner is not None and thicker is not None:
-            interval = f"{1e6 * thinner:.3g} to {1e6 * thicker:.3g} um"
-        beside = "" if steady is None else f"; steady: {1e6 * steady:.3g} um"
-        sentence = (
-            f"Over a cycle of {_time_text(self.cycle.period)} the film of the smooth bodies is at "
-            f"least {1e6 * least:.3g} um ({interval}{beside}), at "
-            f"{_time_text(time)}"
-        )
+        sentence = f"Over a cycle of {_time_text(self.cycle.period)} {self._film_text()}"
         worst = self.worst("clr")
         if worst is not None:
             low, high = worst.interval("clr")

@@ -109,7 +109,14 @@ def lift_off_change(
 
     Parameters and errors are those of `lift_off_speed`.
     """
-    first, last = (lift_off_speed(case, surfaces, progress) for surfaces in (before, after))
+    first, last = (
+        lift_off_speed(
+            case,
+            surfaces,
+            progress,
+        )
+        for surfaces in (before, after)
+    )
     return LiftOffChange(before=first, after=last)
 
 
@@ -183,7 +190,12 @@ def _running_shares(case: Case, surfaces: MovingSurfaces, progress: Progress | N
             lambda snapshot: {"clr": snapshot.state.clr},
             passages=lambda: PASSAGES,
             options=case.options,
-            viscosity_factor=inlet_viscosity_factor(at_speed, oil, moving.grid, thermal),
+            viscosity_factor=inlet_viscosity_factor(
+                at_speed,
+                oil,
+                moving.grid,
+                thermal,
+            ),
         )
         steps = len(series.values) - 1
         if series.failed > MAX_FAILED * steps:

@@ -160,7 +160,13 @@ class _Search:
         else:
             candidate = self._outside(touching, separated)
         return (
-            None if candidate is None else self._clear_of_failures(candidate, touching, separated)
+            None
+            if candidate is None
+            else self._clear_of_failures(
+                candidate,
+                touching,
+                separated,
+            )
         )
 
     def _after_failed_start(self) -> float:
@@ -249,7 +255,13 @@ class _Search:
         relative = [share.half_width / max(share.clr, self.settings.min_share) for share in ends]
         if ends[1].half_width == 0.0:  # no contact at all: nothing about the scatter
             relative[1] = relative[0]
-        half_width = float(np.interp(crossing, [touching, separated], relative))
+        half_width = float(
+            np.interp(
+                crossing,
+                [touching, separated],
+                relative,
+            )
+        )
         density = math.exp(-0.5 * float(ndtri(LIFT_OFF_CLR)) ** 2) / math.sqrt(2.0 * math.pi)
         slope = (self.probit(touching) - self.probit(separated)) / (separated - touching)
         return half_width * LIFT_OFF_CLR / density / slope
@@ -273,7 +285,11 @@ class _Search:
 
 def refined(settings: SearchSettings, found: LiftOff) -> SearchSettings:
     """Return the settings of a search that starts at a crossing found on fewer cells."""
-    settings = replace(settings, first_step=math.log(1.5), margin=0.5 * settings.bracket)
+    settings = replace(
+        settings,
+        first_step=math.log(1.5),
+        margin=0.5 * settings.bracket,
+    )
     speeds = sorted(found.shares, key=lambda speed: abs(math.log(speed / (found.speed or 1.0))))
     closest = [speed for speed in speeds if found.shares[speed].clr > settings.min_share][:2]
     if len(closest) < 2:

@@ -72,33 +72,47 @@ def cycle_command(
     friction, flash temperature and wear per cycle.
     """
     require_page(page, requested=opened)
+    result = _solve(path, overrides, (instants, workers), quiet=quiet)
+    if page is not None:
+        report.write_cycle_report(result, page)
+    if figures is not None:
+        report.write_exhibits(report.cycle_exhibits(result), figures)
+    outputs = {"report": None if page is None else str(page), **named_path("figures", figures)}
+    show(
+        result.verdict(),
+        lambda: result.scalars() | outputs,
+        _instants(result),
+        table([*_totals(result)], [*result.notes, *_unsolved(result)]),
+        [*written("Report", page), *written("Figures", figures)],
+        as_json=as_json,
+        quiet=quiet,
+    )
+    open_page(page, requested=opened)
+    _require_solved(result)
+
+
+def _solve(
+    path: Path,
+    overrides: list[str] | None,
+    effort: tuple[int | None, int | None],
+    *,
+    quiet: bool,
+) -> "CycleResult":
+    """Solve the cycle of a contact's case or of a machine's, with instants and workers."""
+    instants, workers = effort
     if case.has_machine(path):
         machine = case.load_machine(path, read_overrides(overrides))
         chosen, cycle = simulation.machine_contact_cycle(machine)
     else:
         chosen, cycle = chosen_case(path, overrides), None
     with _shown(path.name, quiet=quiet) as step:
-        result = simulation.solve_cycle(
+        return simulation.solve_cycle(
             chosen, cycle, instants=instants, workers=workers, progress=step
         )
-    if page is not None:
-        report.write_cycle_report(result, page)
-    if figures is not None:
-        report.write_exhibits(report.cycle_exhibits(result), figures)
-    show(
-        result.verdict(),
-        lambda: (
-            result.scalars()
-            | {"report": None if page is None else str(page)}
-            | named_path("figures", figures)
-        ),
-        _instants(result),
-        table([*_totals(result)], [*result.notes, *_unsolved(result)]),
-        _saved(page, figures),
-        as_json=as_json,
-        quiet=quiet,
-    )
-    open_page(page, requested=opened)
+
+
+def _require_solved(result: "CycleResult") -> None:
+    """Raise AsperityError unless every time step and every instant was solved."""
     if result.film.failed:
         raise AsperityError(
             f"{result.film.failed} of {result.film.steps} time steps did not converge; refine "
@@ -159,7 +173,3 @@ def _totals(result: "CycleResult") -> Iterator[Row]:
 def _unsolved(result: "CycleResult") -> Iterator[str]:
     for instant in result.failures:
         yield f"The rough contact at {instant.time:.4g} s was not solved: {instant.reason}."
-
-
-def _saved(page: Path | None, figures: Path | None) -> Block:
-    yield from (*written("Report", page), *written("Figures", figures))

@@ -1,0 +1,1 @@
+"""Commands of simulations in time: `asperity run`, `wear`, `cycle` and `deplete`."""
