@@ -33,6 +33,7 @@ ALONE = (
     "speed",
     "conserving",
     "motion",
+    "cycles",
     "films",
     "chosen_films",
     "friction",

@@ -1,6 +1,6 @@
 """Film of a contact that passes its track again and again, as with grease or little oil."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,7 @@ from asperity.core.displayed import Brief
 from asperity.core.documents import JsonObject
 from asperity.core.errors import BadInput
 from asperity.ehl import ContactSolution, solve_contact
-from asperity.solution import Reflow, deplete_track
+from asperity.solution import Pass, Reflow, deplete_track
 
 SETTLED = 0.01  # change of the film from one pass to the next, below which it has settled
 
@@ -109,24 +109,43 @@ def deplete_case(
     if count < 1:
         raise BadInput(f"passes must be 1 or more, got {count}; 20 are usual")
     interval = inlet.interval if interval is None else interval
+    reflow = _reflow(inlet, interval, case.source)
     smooth = case.with_written({"surface": "flat", "model": "conserving"})
-    assert smooth.lubricant is not None
-    parts = smooth.conditions, smooth.lubricant, smooth.surface()
-    options = replace(smooth.options, inlet_layer=None)
-    guess = solve_contact(*parts, options=replace(options, model="mixed"), strict=False)
-    flooded = solve_contact(
-        *parts, options=options, start=guess if guess.convergence.converged else None
-    )
     rows = list[PassRow]()
-    for entry in deplete_track(
-        *parts, options=smooth.options, passes=count, reflow=_reflow(inlet, interval, case.source)
-    ):
+    for entry in _passes(smooth, count, reflow):
         central, least = _films(entry.solution)
         layer = float(entry.layer.thickness_at(np.array(0.0)))
         rows.append(PassRow(number=entry.number, layer=layer, h_central=central, h_min=least))
         if progress is not None:
             progress(entry.number, count)
-    return TrackDepletion(case=case, interval=interval, passes=tuple(rows), flooded=_films(flooded))
+    return TrackDepletion(
+        case=case,
+        interval=interval,
+        passes=tuple(rows),
+        flooded=_films(_flooded(smooth)),
+    )
+
+
+def _passes(smooth: Case, count: int, reflow: Reflow | None) -> Iterator[Pass]:
+    """Yield the passes of a smooth contact over its track."""
+    assert smooth.lubricant is not None
+    return deplete_track(
+        smooth.conditions,
+        smooth.lubricant,
+        smooth.surface(),
+        options=smooth.options,
+        passes=count,
+        reflow=reflow,
+    )
+
+
+def _flooded(smooth: Case) -> ContactSolution:
+    """Return the flooded contact, from that of the model "mixed" if this converges."""
+    options = replace(smooth.options, inlet_layer=None)
+    parts = smooth.conditions, smooth.lubricant, smooth.surface()
+    guess = solve_contact(*parts, options=replace(options, model="mixed"), strict=False)
+    start = guess if guess.convergence.converged else None
+    return solve_contact(*parts, options=options, start=start)
 
 
 def _reflow(inlet: InletSection, interval: float | None, source: str) -> Reflow | None:

@@ -31,7 +31,7 @@ def deplete(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Compute the film of repeated passes over a track with little oil.
+    """Compute the film of repeated passes with little oil.
 
     For grease, state its base oil, the layer left on the track and the oil that it bleeds.
     """
