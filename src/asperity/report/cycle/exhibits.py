@@ -6,11 +6,12 @@ from matplotlib.figure import Figure
 
 from asperity.core.quantities import quantity
 from asperity.report.base import Exhibit
-from asperity.report.drawing import display, name_axes
+from asperity.report.drawing import display, name_axes, plain_log_labels
 from asperity.report.style import BLUE, GREY, VERMILION, Medium
 from asperity.simulation import CycleResult
 
 TIME = "cycle_time_s"
+LABELS = {"flash_temperature_max_k": "flash [K]"}  # shorter than their quantity's
 OF_INSTANTS = ("clr", "friction_coefficient", "flash_temperature_max_k")
 
 
@@ -65,7 +66,9 @@ def _conditions(of_load: Axes, of_speeds: Axes, result: CycleResult) -> None:
         )
     of_speeds.set_ylabel("speed [m/s]")
     of_speeds.axhline(0.0, color=GREY, linewidth=0.6)
-    of_speeds.legend(ncols=2)
+    low, high = of_speeds.get_ylim()
+    of_speeds.set_ylim(low, high + 0.35 * (high - low))  # room for the legend
+    of_speeds.legend(ncols=2, loc="upper left")
 
 
 def _films(axes: Axes, result: CycleResult) -> None:
@@ -93,7 +96,10 @@ def _films(axes: Axes, result: CycleResult) -> None:
             markersize=4,
         )
     axes.set_ylabel(quantity("film_thickness_m").label)
-    axes.legend(ncols=2)
+    plain_log_labels(axes)
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high * (high / low) ** 0.35)  # room for the legend
+    axes.legend(ncols=2, loc="upper left")
 
 
 def _of_instants(axes: Axes, result: CycleResult, key: str) -> None:
@@ -115,7 +121,7 @@ def _of_instants(axes: Axes, result: CycleResult, key: str) -> None:
             continue
         ends = display(key, np.array([low, high]))
         axes.plot([moment, moment], ends, color=BLUE)
-    axes.set_ylabel(quantity(key).label)
+    axes.set_ylabel(LABELS.get(key, quantity(key).label))
     axes.set_ylim(bottom=0.0)
 
 
