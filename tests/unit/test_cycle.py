@@ -18,10 +18,12 @@ from asperity.simulation.cycle.instants import (
     CELLS,
     SLIDING_CELLS,
     InstantJob,
+    InstantRow,
     solve_instant,
     window_times,
 )
 from asperity.simulation.cycle.result import CycleResult
+from asperity.simulation.cycle.run import _combined
 from asperity.transient import cycle_contact
 from asperity.wear import WearCoefficient
 
@@ -551,3 +553,61 @@ def test_a_number_without_an_interval_gives_a_total_without_one():
     assert result.mean_clr.low is None
     assert result.instants[0].interval("clr") == (None, None)
     assert result.instants[1].interval("clr") == pytest.approx((0.05, 0.15))
+
+
+def row(clr, reason=""):
+    numbers = {"clr": clr, "car": clr, "friction_below": 0.01, "friction_above": 0.02}
+    return InstantRow({} if reason else numbers, 10, 0, reason)
+
+
+def test_tracks_are_corrected_by_the_difference_of_both_grids():
+    """Mean of 0.5, 0.6 and 0.4; half-width by Student's t of three, and the grids' difference."""
+    combined = _combined(0.1, row(0.5), [row(0.3), row(0.4), row(0.2)], [])
+    assert combined.numbers["clr"] == pytest.approx(0.5)
+    scatter = 2.919986 * 0.1 / math.sqrt(3.0)
+    assert combined.half_widths["clr"] == pytest.approx(math.hypot(scatter, 0.2), rel=1e-5)
+    assert (combined.tracks, combined.friction_sides) == (3, (0.01, 0.02))
+
+
+def test_without_a_coarse_grid_tracks_are_those_of_the_fine_one():
+    failed = row(0.0, "too coarse")
+    combined = _combined(0.1, row(0.5), [failed, failed], [row(0.7)])
+    assert combined.numbers["clr"] == pytest.approx(0.6)
+    assert combined.half_widths["clr"] is None
+    unsolved = _combined(0.1, failed, [failed], [])
+    assert (unsolved.reason, unsolved.numbers) == ("too coarse", {})
+
+
+class Film:
+    """Film of 1 um, thinner by a share."""
+
+    def __init__(self, thinner):
+        self.times, self.measured = np.array([0.0, 2.0]), {}
+        self.h_min = self.h_central = np.array([1.0, 1.0]) * 1e-6 * (1.0 - thinner)
+
+    def interpolated(self, name, times):
+        return np.interp(times, self.times, getattr(self, name))
+
+
+def test_the_interval_of_a_film_is_by_cells_and_time_steps():
+    result = result_of([])
+    object.__setattr__(result, "film", Film(0.0))
+    assert result.film_interval("h_min", 1.0) == (None, None)
+    object.__setattr__(result, "coarse", Film(0.03))
+    low, high = result.film_interval("h_min", 1.0)
+    error = math.hypot(0.03, 0.02)
+    assert (low, high) == pytest.approx((1e-6 * (1.0 - error), 1e-6 * (1.0 + error)), rel=1e-9)
+
+
+def test_energy_counts_the_carried_load():
+    cycle = OperatingCycle(
+        times=[0.0, 2.0],
+        loads=[300.0, 300.0],
+        speeds=[(1.25, 0.75)] * 2,
+        radii=[0.01, 0.01],
+        carried=[100.0, 100.0],
+    )
+    result = result_of([instant(time, 0.5) for time in (0.0, 0.5, 1.0, 1.5)])
+    object.__setattr__(result, "film", Course())
+    object.__setattr__(result, "cycle", cycle)
+    assert result.friction_energy.value == pytest.approx(10.0)
