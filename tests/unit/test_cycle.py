@@ -25,6 +25,7 @@ from asperity.simulation.cycle.instants import (
 from asperity.simulation.cycle.result import CycleResult
 from asperity.simulation.cycle.run import _combined
 from asperity.transient import cycle_contact
+from asperity.transient.cycle import _mean_speeds
 from asperity.wear import WearCoefficient
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -175,6 +176,8 @@ def test_steps_of_a_window_follow_the_oil_over_whole_cells(time):
         assert slid <= (CELLS if followed else SLIDING_CELLS) + 1e-6
     if time == 0.0:
         assert whole == len(times) - 1
+        lengths = np.diff([cycle.travelled(float(moment))[0] for moment in times]) / spacing
+        assert np.median(lengths) > 1.5  # two cells of oil, if roughness slides little
 
 
 def test_a_window_extends_beyond_a_cycle_that_does_not_repeat():
@@ -223,6 +226,26 @@ def test_a_grid_holds_a_short_peak_of_the_load():
     half_width = peak.conditions(0.051, case.conditions).hertz.half_widths[0]
     assert grid.lower[0] <= -2.0 * half_width
     assert grid.upper[0] >= 1.5 * half_width
+
+
+def test_a_grid_holds_a_load_without_entrainment():
+    case = load_case(EXAMPLES / "paper.toml")
+    peak = OperatingCycle(
+        times=[0.0, 0.05, 0.06, 0.1],
+        loads=[500.0, 20e3, 20e3, 500.0],
+        speeds=[(1.0, 1.0), (0.0, 0.0), (0.0, 0.0), (1.0, 1.0)],
+        radii=[0.01] * 4,
+    )
+    grid = cycle_grid(peak, case.conditions, case.lubricant)
+    half_width = peak.conditions(0.05, case.conditions).hertz.half_widths[0]
+    assert grid.upper[0] >= 1.5 * half_width
+
+
+def test_a_step_that_follows_oil_has_its_mean_speed():
+    state = turning().state(0.005)
+    first, second = _mean_speeds(state, 1.2)
+    assert 0.5 * (first + second) == pytest.approx(1.2)
+    assert first - second == pytest.approx(state.sliding_speed)
 
 
 def test_times_equal_but_for_rounding_are_one():
@@ -393,7 +416,7 @@ def test_the_slice_of_a_helical_gear_passes_with_its_line_load():
         teeth=(16, 24),
         pressure_angle=math.radians(20.0),
         profile_shift=(0.18, 0.17),
-        face_width=0.06,
+        face_width=0.2,
         torque=265.1,
         speed=227.0,
         helix_angle=math.radians(15.0),
@@ -524,6 +547,8 @@ def test_friction_energy_is_force_times_path():
     energy = result.friction_energy
     assert energy.value == pytest.approx(30.0)
     assert (energy.low, energy.high) == pytest.approx((27.0, 36.0))
+    object.__setattr__(result, "cycle", turning(speed=0.0001, period=2.0, sliding=-0.5))
+    assert result.friction_energy.value == pytest.approx(30.0)
 
 
 def test_wear_is_archards_with_the_load_of_the_asperities():

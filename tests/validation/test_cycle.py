@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -234,6 +235,46 @@ def test_both_halves_of_an_oscillation_are_mirror_images():
     assert course.closure < 0.01
     # thinnest after the turn, where the constriction of the outlet meets the inlet
     assert course.times[np.argmin(course.h_min)] % 0.01 > 0.005
+
+
+def test_the_film_stays_where_it_is_while_oil_turns_round():
+    """x then points the other way: the gap of one step is that of the next, mirrored."""
+    cycle = OperatingCycle(
+        times=[0.0, 2e-3],
+        loads=[500.0] * 2,
+        speeds=[(0.2, 0.1), (-0.2, -0.1)],
+        radii=[RADIUS] * 2,
+    )
+    contact = line(500.0)
+    grid = cycle_grid(cycle, contact, OIL)
+    times = np.concatenate([np.linspace(0.0, 0.98e-3, 20), np.linspace(0.99e-3, 1.11e-3, 61)])
+    gaps = [step.solution.gap for step in cycle_contact(cycle, contact, OIL, smooth(grid), times)]
+    zone = np.abs(grid.x) < contact.hertz.half_widths[0]
+    turned = [np.max(np.abs(after[::-1] / before - 1.0)[zone]) for before, after in pairwise(gaps)]
+    kept = [np.max(np.abs(after / before - 1.0)[zone]) for before, after in pairwise(gaps)]
+    turn = int(np.argmin(turned[20:])) + 20
+    assert turned[turn] < 0.01
+    assert kept[turn] > 0.1  # the outlet's constriction is now at the inlet
+    assert max(change for number, change in enumerate(kept[20:], 20) if number != turn) < 0.03
+
+
+def test_roughness_is_mirrored_with_the_oil():
+    case = load_case(EXAMPLES / "paper.toml").with_overrides(
+        {"grid.cells": [48, 24], "grid.x": [-2.0, 2.0], "grid.y": [-1.0, 1.0]}
+    )
+    surfaces = case.moving_surfaces(4)
+    cycle = OperatingCycle(
+        times=[0.0, 1e-3], loads=[500.0] * 2, speeds=[(1.0, 0.5), (-1.0, -0.5)], radii=[5.4e-3] * 2
+    )
+    times = np.array([0.0, 1e-5, 0.6e-3])
+    options = replace(case.options, tolerance=0.09)
+    steps = [
+        *cycle_contact(cycle, case.conditions, case.lubricant, surfaces, times, options=options)
+    ]
+    for step, turned in zip(steps, (False, False, True), strict=True):
+        heights = surfaces.composite_displaced(cycle.travelled(step.time)).heights
+        expected = heights[::-1] if turned else heights
+        np.testing.assert_allclose(step.solution.surface.heights, expected, atol=1e-15)
 
 
 def test_the_grid_of_a_cycle_does_not_decide_its_film(monkeypatch):
