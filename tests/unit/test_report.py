@@ -538,7 +538,7 @@ def test_every_report_has_its_template():
     names = re.findall(
         r'render\(\s*"(\S+)"', "".join(path.read_text("utf-8") for path in folder.rglob("page.py"))
     )
-    assert len(names) == 7
+    assert len(names) == 8
     assert [name for name in names if not (folder / name).is_file()] == []
 
 

@@ -31,7 +31,7 @@ class _CycleSection(Section):
 
 
 class TableCycleSection(_CycleSection):
-    """[cycle] kind = "table": a file of times, loads and speeds."""
+    """[cycle] of kind "table": a file of times, loads and speeds."""
 
     kind: Literal["table"]
     file: str
@@ -42,7 +42,7 @@ class TableCycleSection(_CycleSection):
 
 
 class StartStopSection(_CycleSection):
-    """[cycle] kind = "start-stop": from rest to the speeds of [contact] and back."""
+    """[cycle] of kind "start-stop": from rest to the speeds of [contact] and back."""
 
     kind: Literal["start-stop"]
     rise: Annotated[float, amount_in("s")]
@@ -63,7 +63,7 @@ class StartStopSection(_CycleSection):
 
 
 class OscillationSection(_CycleSection):
-    """[cycle] kind = "oscillation": both surface speeds of [contact] times a cosine."""
+    """[cycle] of kind "oscillation": both surface speeds of [contact] times a cosine."""
 
     kind: Literal["oscillation"]
     frequency: Annotated[float, amount_in("Hz")]

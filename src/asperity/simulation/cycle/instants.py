@@ -32,10 +32,8 @@ STEPS_PER_PERIOD = 200  # at least, if the whole cycle were computed like this
 WHOLE = 1e-9  # of a cell: a path of whole cells
 MAX_STEPS = 80  # of a simulation before its instant
 SLOW = 0.02  # of the largest entrainment speed; slower instants have the grid of this one
-COARSE_CELLS, SAMPLES = (
-    8.0,
-    41,
-)  # in a half-width, and of the time before, to find the widest contact
+COARSE_CELLS = 8.0  # in a half-width, to find the time before an instant
+SAMPLES = 41  # of that time, to find its widest contact
 MARGIN = 1.1  # on the cells of a contact that narrows
 STEP_TOLERANCE = 1e-2  # as of other running contacts
 MAX_FAILED = 0.25  # share of averaged steps that may miss it
