@@ -267,12 +267,12 @@ def test_roughness_is_mirrored_with_the_oil():
     cycle = OperatingCycle(
         times=[0.0, 1e-3], loads=[500.0] * 2, speeds=[(1.0, 0.5), (-1.0, -0.5)], radii=[5.4e-3] * 2
     )
-    times = np.array([0.0, 1e-5, 0.6e-3])
+    times = np.array([0.0, 1e-5, 0.5e-3, 0.6e-3])
     options = replace(case.options, tolerance=0.09)
     steps = [
         *cycle_contact(cycle, case.conditions, case.lubricant, surfaces, times, options=options)
     ]
-    for step, turned in zip(steps, (False, False, True), strict=True):
+    for step, turned in zip(steps, (False, False, False, True), strict=True):
         heights = surfaces.composite_displaced(cycle.travelled(step.time)).heights
         expected = heights[::-1] if turned else heights
         np.testing.assert_allclose(step.solution.surface.heights, expected, atol=1e-15)

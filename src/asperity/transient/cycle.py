@@ -283,7 +283,8 @@ class _Marcher:
         fields = _carried(memory, before, after, backwards)
         if length.ratio > MAX_RATIO:
             fields.pop("content_before", None)
-        if length.cells != memory.cells and "leant" in fields:  # of the last step's path
+        follows = length.cells == memory.cells or math.isinf(memory.length)  # at the start: any
+        if not follows and "leant" in fields:  # of the last step's path
             fields["leant"] = np.zeros_like(fields["leant"])
         return fields
 
