@@ -203,7 +203,8 @@ def solve_starved(
     )
     solution = None if start is None else solve(options=options, start=start)
     if solution is None or not solution.convergence.converged:
-        flooded = _flooded(solve, replace(options, inlet_layer=None))
+        without = replace(options, inlet_layer=None)
+        flooded = solve(options=without) if conditions.endless else _flooded(solve, without)
         if conditions.endless and passes_less(flooded, options.inlet_layer):
             return flooded
         for front in FRONTS:
