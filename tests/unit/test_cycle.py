@@ -231,10 +231,10 @@ def test_a_grid_holds_a_short_peak_of_the_load():
 def test_a_grid_holds_a_load_without_entrainment():
     case = load_case(EXAMPLES / "paper.toml")
     peak = OperatingCycle(
-        times=[0.0, 0.05, 0.06, 0.1],
-        loads=[500.0, 20e3, 20e3, 500.0],
-        speeds=[(1.0, 1.0), (0.0, 0.0), (0.0, 0.0), (1.0, 1.0)],
-        radii=[0.01] * 4,
+        times=[0.0, 0.04, 0.05, 0.06, 0.1],
+        loads=[500.0, 500.0, 20e3, 500.0, 500.0],
+        speeds=[(1.0, 1.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (1.0, 1.0)],
+        radii=[0.01] * 5,
     )
     grid = cycle_grid(peak, case.conditions, case.lubricant)
     half_width = peak.conditions(0.05, case.conditions).hertz.half_widths[0]
