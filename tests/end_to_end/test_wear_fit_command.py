@@ -87,9 +87,10 @@ def test_an_incomplete_fit_is_refused(asp, recorded):
     for given, message in (
         (("--fit", trace), "--fit TRACE and --scar PROFILE go together"),
         (("--scar", scar), "--fit TRACE and --scar PROFILE go together"),
+        (("--fit", trace, "--scar", scar, "--lift-off"), "without a case, --hours or --lift-off"),
         (
             ("case.toml", "--hours", "1", "--fit", trace, "--scar", scar),
-            "without a case or --hours",
+            "without a case, --hours or --lift-off",
         ),
         (("case.toml",), "needs a case and --hours"),
         ((), "needs a case and --hours"),

@@ -1,7 +1,7 @@
 """Solve a contact from conditions, lubricant and surface, by the model of the options."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -18,7 +18,7 @@ from asperity.ehl.film_formulas import central_film, require_thin_film
 from asperity.ehl.models.elastic_dry import elastic_contact
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.single_pressure import Step, newton
-from asperity.ehl.outcome import ARITHMETIC, ATTEMPTS, FROM_DRY, MIXED, PAPER, Options
+from asperity.ehl.outcome import ARITHMETIC, ATTEMPTS, FROM_DRY, PAPER, Options
 from asperity.ehl.problem_setup import (
     contact_problem,
     first_guess,
@@ -30,7 +30,11 @@ from asperity.ehl.scales import Scales
 from asperity.ehl.strategies.grid_continuation import Progress, Search
 from asperity.ehl.strategies.mixed_search import COARSE_TO_FINE, ROBUST, MixedSearch
 from asperity.ehl.strategies.oil_state import pressures_of
-from asperity.ehl.strategies.starved_inlet import FRONTS, emptied_inlet, passes_less
+from asperity.ehl.strategies.starved_inlet import (
+    emptied_inlet,
+    march_to_steady,
+    passes_less,
+)
 from asperity.lubricant import Lubricant, require_liquid
 from asperity.surface import Surface
 
@@ -187,12 +191,13 @@ def solve_starved(
 ) -> ContactSolution:
     """Solve a conserving contact with an inlet layer; called by `solve_contact`.
 
-    The guesses are the neighbouring solution, if there is one, and then the flooded contact with
-    its inlet emptied up to several fronts. A line contact that passes less than the layer has
-    nowhere to push the rest: it is flooded.
+    The guess is the neighbouring solution, if there is one, or else the flooded contact with its
+    inlet emptied. A line contact that passes less than the layer has nowhere to push the rest: it
+    is flooded.
     """
     began = time.perf_counter()
     assert options.inlet_layer is not None
+    assert lubricant is not None
     solve = partial(
         solve_mixed,
         conditions,
@@ -201,30 +206,28 @@ def solve_starved(
         viscosity_factor=viscosity_factor,
         progress=progress,
     )
-    solution = None if start is None else solve(options=options, start=start)
-    if solution is None or not solution.convergence.converged:
-        without = replace(options, inlet_layer=None)
-        flooded = solve(options=without) if conditions.endless else _flooded(solve, without)
-        if conditions.endless and passes_less(flooded, options.inlet_layer):
-            return flooded
-        for front in FRONTS:
-            guess = emptied_inlet(flooded, options.inlet_layer, front)
-            solution = solve(options=options, start=guess)
-            if solution.convergence.converged:
-                break
-    assert solution is not None
-    taken = replace(solution.convergence, seconds=time.perf_counter() - began)
-    return replace(solution, convergence=taken)
-
-
-def _flooded(solve: Callable[..., ContactSolution], options: Options) -> ContactSolution:
-    """Return the flooded contact, from that of the model "mixed" if this converges."""
-    guess = solve(options=replace(options, model=MIXED))
-    if guess.convergence.converged:
-        solution = solve(options=options, start=guess)
+    if start is not None:
+        solution = solve(options=options, start=start)
         if solution.convergence.converged:
             return solution
-    return solve(options=options)
+    flooded = solve(options=replace(options, inlet_layer=None))
+    if conditions.endless and passes_less(flooded, options.inlet_layer):
+        return flooded
+    guess = emptied_inlet(flooded, options.inlet_layer)
+    scales = Scales.from_conditions(conditions, lubricant)
+    full_problem = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
+    problem = reduced_problem(full_problem)
+    search = MixedSearch(options, scales.gap, progress)
+    step = march_to_steady(search, problem, pressures_of(guess, problem, scales))
+    solution = search.solution(
+        step,
+        surface,
+        conditions,
+        lubricant,
+        seconds=time.perf_counter() - began,
+        start=guess,
+    )
+    return replace(solution, viscosity_factor=viscosity_factor)
 
 
 def _solve_cold(

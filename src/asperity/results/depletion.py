@@ -112,6 +112,8 @@ def deplete_case(
     reflow = _reflow(inlet, interval, case.source)
     smooth = case.with_written({"surface": "flat", "model": "conserving"})
     rows = list[PassRow]()
+    options = replace(smooth.options, inlet_layer=None)
+    flooded = solve_contact(smooth.conditions, smooth.lubricant, smooth.surface(), options=options)
     for entry in _passes(smooth, count, reflow):
         central, least = _films(entry.solution)
         layer = float(entry.layer.thickness_at(np.array(0.0)))
@@ -122,7 +124,7 @@ def deplete_case(
         case=case,
         interval=interval,
         passes=tuple(rows),
-        flooded=_films(_flooded(smooth)),
+        flooded=_films(flooded),
     )
 
 
@@ -137,15 +139,6 @@ def _passes(smooth: Case, count: int, reflow: Reflow | None) -> Iterator[Pass]:
         passes=count,
         reflow=reflow,
     )
-
-
-def _flooded(smooth: Case) -> ContactSolution:
-    """Return the flooded contact, from that of the model "mixed" if this converges."""
-    options = replace(smooth.options, inlet_layer=None)
-    parts = smooth.conditions, smooth.lubricant, smooth.surface()
-    guess = solve_contact(*parts, options=replace(options, model="mixed"), strict=False)
-    start = guess if guess.convergence.converged else None
-    return solve_contact(*parts, options=options, start=start)
 
 
 def _reflow(inlet: InletSection, interval: float | None, source: str) -> Reflow | None:

@@ -130,10 +130,10 @@ def wear(
 ) -> None:
     """Simulate wear over hours, or fit a wear coefficient to a test."""
     if fit is not None or scar is not None:
-        if fit is None or scar is None or path is not None or hours is not None:
+        if fit is None or scar is None or path or hours or lift_off:
             raise BadInput(
-                "--fit TRACE and --scar PROFILE go together, without a case or --hours; state "
-                "only these two"
+                "--fit TRACE and --scar PROFILE go together, without a case, --hours or "
+                "--lift-off; state only these two"
             )
         amounts = {
             "load": _amount("--load", "N", load),

@@ -37,14 +37,15 @@ class MixedSearch(ExactFaceSearch):
     """Strategies of the two-pressure models, with all steps on record."""
 
     imbalance = 0.0  # of the last step, where oil is conserved
+    max_imbalance = np.inf  # of it, at any tolerance
 
     def converged(self, tolerance: float, *, check_load: bool = True) -> bool:
         """Return True if the last step met the tolerance; if last, with conserved oil balanced."""
         rounding = self.history[-1].residual < SEARCH.rounding
         closely = tolerance <= self.options.tolerance and not rounding
         allowed = max(SEARCH.max_imbalance, SEARCH.imbalance_to_tolerance * tolerance)
-        return super().converged(tolerance, check_load=check_load) and not (
-            closely and self.imbalance > allowed
+        return super().converged(tolerance, check_load=check_load) and (
+            self.imbalance <= min(self.max_imbalance, allowed if closely else np.inf)
         )
 
     def solution(
@@ -248,7 +249,7 @@ class MixedSearch(ExactFaceSearch):
         content = evaluate(problem, unknowns, second_order=False).content
         max_steps = min(MARCHING.max_newton_steps, self.options.max_iterations)
         for _ in range(MARCHING.max_steps):
-            stepped = replace(problem, past=_implicit_step(problem, length, content))
+            stepped = replace(problem, past=implicit_step(problem, length, content))
             step = self.run(
                 stepped,
                 newton(stepped, unknowns, second_order=False),
@@ -412,7 +413,7 @@ def _refilled(problem: Problem, unknowns: Pressures) -> tuple[Problem, Pressures
     return replace(problem, conserve=False), Pressures(oil, unknowns.total, unknowns.approach)
 
 
-def _implicit_step(problem: Problem, length: float, content: Field) -> TransientTerm:
+def implicit_step(problem: Problem, length: float, content: Field) -> TransientTerm:
     """Add an implicit time step to the problem, with the oil present at its start."""
     past = (
         TransientTerm(0.0, np.zeros_like(content), lagrangian=False)

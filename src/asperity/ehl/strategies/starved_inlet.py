@@ -1,22 +1,28 @@
-"""Initial guesses of a starved contact: the flooded one, its inlet emptied up to a front."""
+"""Starved contacts: an initial guess with an emptied inlet, and time steps that move its front."""
 
 from dataclasses import replace
 
 import numpy as np
 
 from asperity.ehl.contact_solution import ContactSolution
+from asperity.ehl.controls import CONTINUATION, MENISCUS, SEARCH
 from asperity.ehl.inlet_layer import InletLayer
+from asperity.ehl.models.mixed import Pressures, evaluate
+from asperity.ehl.models.single_pressure import Problem
+from asperity.ehl.newton.mixed import newton
+from asperity.ehl.newton.single_pressure import Step
+from asperity.ehl.strategies.mixed_search import MixedSearch, implicit_step
+from asperity.ehl.strategies.oil_state import unknowns_of
 
-# gap over the layer's thickness at the front; the true one follows from the solution
-FRONTS = (4.0, 2.2, 8.0, 1.6, 16.0)
 
-
-def emptied_inlet(flooded: ContactSolution, layer: InletLayer, front: float) -> ContactSolution:
-    """Return a flooded contact without pressure where the gap ahead is `front` times the layer."""
+def emptied_inlet(flooded: ContactSolution, layer: InletLayer) -> ContactSolution:
+    """Return a flooded contact without pressure where the gap ahead is far wider than the layer."""
     assert flooded.oil is not None
-    thickness = layer.thickness_at(flooded.grid.y)[None, :]
-    empty = (flooded.gap > front * thickness) & (flooded.grid.x[:, None] < 0.0)
-    content = np.where(empty, thickness / flooded.gap, flooded.oil.content)
+    thickness, gap = layer.thickness_at(flooded.grid.y)[None, :], flooded.gap
+    central = gap[np.argmin(np.abs(flooded.grid.x)), gap.shape[1] // 2]
+    front = np.maximum(MENISCUS.front * thickness, MENISCUS.front_film * central)
+    empty = (gap > front) & (flooded.grid.x[:, None] < 0.0)
+    content = np.where(empty, thickness / gap, flooded.oil.content)
     oil = replace(flooded.oil, content=content, pressure=np.where(empty, 0.0, flooded.oil.pressure))
     return replace(flooded, pressure=np.where(empty, 0.0, flooded.pressure), oil=oil)
 
@@ -26,3 +32,40 @@ def passes_less(flooded: ContactSolution, layer: InletLayer) -> bool:
     assert flooded.oil is not None
     passed = flooded.oil.content[-1] * flooded.gap[-1]  # at ambient pressure
     return bool(np.all(passed <= layer.thickness_at(flooded.grid.y)))
+
+
+def march_to_steady(search: MixedSearch, problem: Problem, unknowns: Pressures) -> Step:
+    """Follow the front of the oil in time steps until it stands, and solve the steady contact.
+
+    Newton steps move the front by a cell each, and from afar they alternate. A time step moves it
+    as far as the oil travels; its imbalance has to be a share of the steady one's before it.
+    """
+    length, tolerance = MENISCUS.first_length, search.options.tolerance
+    robust = replace(problem, exact=False)
+    balance = evaluate(robust, unknowns, second_order=False)
+    steps_allowed = min(MENISCUS.max_newton_steps, search.options.max_iterations)
+    stands = False
+    for _ in range(MENISCUS.max_time_steps):
+        stepped = replace(robust, past=implicit_step(problem, length, balance.content))
+        search.max_imbalance = MENISCUS.forcing * max(balance.imbalance, SEARCH.max_imbalance)
+        steps = newton(stepped, balance.unknowns, second_order=False)
+        step = search.run(stepped, steps, CONTINUATION.coarse_tolerance, steps_allowed)
+        if search.converged(CONTINUATION.coarse_tolerance):
+            balance = evaluate(robust, unknowns_of(step), second_order=False)
+            length *= _growth(step.number)
+            stands = balance.imbalance < SEARCH.max_imbalance and search.converged(tolerance)
+        else:
+            length *= 0.25
+        if stands or length < MENISCUS.min_length:
+            break
+    search.max_imbalance = np.inf
+    if stands and not problem.exact:  # a steady step would move the front again
+        step = search.run(robust, iter([replace(step, number=0, balance=balance)]), tolerance, 0)
+        if search.converged(tolerance):
+            return step
+    return search.continue_from(problem, balance.unknowns)
+
+
+def _growth(steps: int) -> float:
+    """Return the factor of the next time step after one that took so many Newton steps."""
+    return 2.0 if steps <= 3 else 1.2 if steps <= 6 else 1.0 if steps <= 8 else 0.5
