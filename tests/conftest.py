@@ -4,6 +4,7 @@
 
 import os
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,10 @@ os.environ.pop("COLUMNS", None)  # of the parallel runner's terminal; output wou
 
 HERE = Path(__file__).parent
 SLOW = set((HERE / "slow.txt").read_text("utf-8").split())  # files of more than about 10 s
+SOLVERS = (  # modules that start workers where several cores are idle
+    *("machines.solve", "results.running", "results.solve", "simulation.cycle.run"),
+    *("simulation.wear.contact", "cli.simulated.wear", "study.execute"),
+)
 
 
 @pytest.fixture(autouse=True)
@@ -22,6 +27,18 @@ def _without_log_lines(monkeypatch):
     """Print no lines of progress in this process; their times depend on the load of the machine."""
     if (output := sys.modules.get("asperity.cli.output")) is not None:
         monkeypatch.setattr(output, "FIRST_LINE_S", 1e6)
+
+
+@pytest.fixture
+def in_this_process(monkeypatch):
+    """Solve contacts in this process, as with one core; starting a worker takes seconds.
+
+    For tests of what is solved; those of workers start them.
+    """
+    monkeypatch.setattr("asperity.core.processes.cores", lambda: 1)
+    for module in SOLVERS:
+        monkeypatch.setattr(f"asperity.{module}.cores", lambda: 1)
+    monkeypatch.setattr("asperity.study.execute._pool", lambda _: ThreadPoolExecutor(1))
 
 
 @pytest.fixture

@@ -14,6 +14,12 @@ TABLE = """time_s,load_n,speed_first_m_s,speed_second_m_s,radius_m
 """
 
 
+@pytest.fixture(autouse=True)
+def coarse_film(monkeypatch):
+    """Solve the smooth bodies on fewer cells; test_cycles compares their films with others."""
+    monkeypatch.setattr("asperity.simulation.cycle.film.MAX_LINE_CELLS", 128)
+
+
 @pytest.fixture
 def cycling(asp):
     def run(text, *words):

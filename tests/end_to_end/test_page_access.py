@@ -55,6 +55,19 @@ FOREIGN = [  # Host and Origin, of which PORT is the server's
     ("169.254.1.1:PORT", None),
 ]
 
+HOSTILE_HEADERS = [
+    {"Host": "evil.example"},
+    {"Host": '"><script>pwned</script>'},
+    {"X-Forwarded-Host": "<script>pwned</script>"},
+    {"X-Forwarded-Proto": "javascript"},
+    {"X-Forwarded-Prefix": "/<script>pwned</script>"},
+    {"Referer": "<script>pwned</script>"},
+    {"User-Agent": "<script>pwned</script>"},
+    {"Cookie": "is_guest=1; user=<script>pwned</script>"},
+    {"Bokeh-Session-Id": "<script>pwned</script>"},
+    {"Accept-Language": "{{7*7}}<script>pwned</script>"},
+]
+
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory):
@@ -128,6 +141,27 @@ def test_names_of_other_servers_are_refused_although_the_cookie_is_right(server,
     assert (status in (400, 403), "Set-Cookie" in headers) == (True, False)
 
 
+@pytest.mark.parametrize("header", HOSTILE_HEADERS, ids=lambda header: next(iter(header)))
+def test_a_header_does_not_appear_in_the_page(server, header):
+    status, headers, text = ask(server, "/contact", {**server.cookie, **header})
+    assert status in (200, 400, 403)
+    for hostile in ("pwned", "evil.example", "{{7*7}}"):
+        assert hostile not in f"{headers.items()} {text}"
+
+
+@pytest.mark.parametrize(
+    "origin", ["http://evil.example", "http://127.0.0.1:1", "null", "http://127.0.0.1.evil.example"]
+)
+def test_a_websocket_of_a_foreign_origin_gets_403(server, origin):
+    headers = {**server.cookie, **WEBSOCKET, "Origin": origin}
+    assert ask(server, "/contact/ws", headers)[0] == 403
+
+
+def test_the_first_address_opens_the_contact(server):
+    status, headers, _ = ask(server, "/", server.cookie)
+    assert (status, headers["Location"]) == (302, "/contact")
+
+
 @pytest.mark.parametrize("name", ["127.0.0.1", "localhost", "LOCALHOST"])
 def test_an_admitted_visitor_gets_page_and_websocket(server, name):
     host = f"{name}:{server.host.rpartition(':')[2]}"
@@ -188,10 +222,10 @@ def test_requests_alone_start_no_work(server):
     """Image tags of another web site started a solve each."""
     ask(server, "/contact", server.cookie)
     quiet = 0
-    while quiet < 3:  # [s], until all workers have loaded the solver
+    while quiet < 3:  # times, until all workers have loaded the solver
         before = processor_seconds(server)
-        time.sleep(1.0)
-        quiet = quiet + 1 if processor_seconds(server) - before < 0.05 else 0
+        time.sleep(0.5)
+        quiet = quiet + 1 if processor_seconds(server) - before < 0.03 else 0
     before = processor_seconds(server)
     for number in range(8):
         status, _, _ = ask(server, f"/contact?contact.load={500 + number}+N", server.cookie)
@@ -223,8 +257,7 @@ def test_a_page_of_another_site_can_neither_hold_nor_read_nor_connect(server, br
         .then(() => "read", () => "refused")
       window.outcome = Promise.all([opened, read])</script>"""
     threading.Thread(target=site.serve_forever, daemon=True).start()
-    visit = Visit(browser, server)
-    visit.context.unroute_all()
+    visit = Visit(browser, server, alone=True)
     visit.page.goto(f"http://127.0.0.1:{site.server_port}/")
     assert visit.page.evaluate("() => window.outcome") == ["refused", "refused"]
     visit.page.wait_for_timeout(500)
@@ -264,12 +297,23 @@ def test_wrong_passwords_take_a_second_each_however_many_are_sent(remote):
     assert ask(remote, "/contact", {"Cookie": cookie.partition(";")[0]})[0] == 200
 
 
+IDLE_S = 5  # in place of 20 s, after which the server closes a silent connection
+SHORT_IDLE = f"""
+import sys
+from asperity.app.serving import server
+from asperity.cli import main
+assert 0.0 < server.HTTP_LIMITS["idle_connection_timeout"] <= 60.0
+server.HTTP_LIMITS["idle_connection_timeout"] = {IDLE_S}
+main(sys.argv[1:])
+"""
+
+
 def test_idle_connections_do_not_stop_the_server(tmp_path):
     """400 connections without a request, where 256 open files are permitted by default."""
     limits = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (256, limits[1]))
     try:
-        started = serving(tmp_path)
+        started = serving(tmp_path, program=("-c", SHORT_IDLE))
         server = started.__enter__()
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, limits)
@@ -293,6 +337,22 @@ def test_a_large_password_is_refused_at_once(remote, size):
         connection.sendall(head.encode() + b"password=" + b"x" * 1000)
         assert b" 400 " in connection.recv(100)
     assert time.monotonic() - before < 1.0
+
+
+def test_a_password_opens_the_page_in_a_browser(remote, browser):
+    visit = Visit(browser, remote, admitted=False)
+    page = visit.page
+    page.goto(f"http://{remote.host}/contact")
+    assert page.url == f"http://{remote.host}/login"
+    page.locator("input[type=password]").fill("wrong one")
+    page.keyboard.press("Enter")
+    page.get_by_text("Wrong password.").wait_for()
+    assert visit.errors.pop().endswith("403 (Forbidden)")
+    assert page.get_by_role("textbox", name="Load, F").count() == 0
+    page.locator("input[type=password]").fill(PASSWORD)
+    page.keyboard.press("Enter")
+    page.get_by_role("textbox", name="Load, F").wait_for()  # sent over the websocket
+    visit.close()
 
 
 def test_remote_visitors_need_the_password(remote):

@@ -1,7 +1,6 @@
 """The pages of recordings, studies and histories in a browser, and the password of --listen."""
 
 import json
-import os
 import re
 import shutil
 
@@ -83,20 +82,6 @@ def test_dropped_recordings_show_their_resonance_or_a_reason(browser, server, tm
     visit.close()
 
 
-def test_a_folder_is_watched(browser, tmp_path, rig):
-    folder, files = tmp_path / "arriving", sorted(rig.glob("*.h5"))
-    folder.mkdir()
-    for path in files[:6]:
-        shutil.copy2(path, folder)
-    with serving(tmp_path, str(folder)) as server:
-        visit = Visit(browser, server)
-        page = visit.go("recordings")
-        page.get_by_text("6 recordings read; the folder is being watched.").wait_for()
-        shutil.copy2(files[6], folder)
-        page.get_by_text("7 recordings read; the folder is being watched.").wait_for()
-        visit.close()
-
-
 def test_a_point_of_a_study_opens_as_an_adjustable_contact(browser, tmp_path):
     study = {"sq": ["0.5 um", "1.5 um"], "seeds": 2, "kind": "solve"}
     run_study(
@@ -145,39 +130,21 @@ def test_a_history_is_animated(browser, tmp_path):
         visit.close()
 
 
-def test_remote_users_need_the_password(browser, tmp_path):
-    with serving(tmp_path, "--listen", "0.0.0.0", ASPERITY_PAGE_PASSWORD="long enough") as server:
-        visit = Visit(browser, server, admitted=False)
-        page = visit.page
-        page.goto(f"http://{server.host}/contact")
-        assert page.url == f"http://{server.host}/login"
-        page.locator("input[type=password]").fill("wrong one")
-        page.keyboard.press("Enter")
-        page.get_by_text("Wrong password.").wait_for()
-        assert visit.errors.pop().endswith("403 (Forbidden)")
-        assert page.get_by_role("textbox", name="Load, F").count() == 0
-        page.locator("input[type=password]").fill("long enough")
-        page.keyboard.press("Enter")
-        page.get_by_role("textbox", name="Load, F").wait_for()  # sent over the websocket
-        visit.close()
-
-
-def test_the_folder_of_a_rig_gives_the_verdict_of_track(browser, tmp_path, rig, capsys):
-    copied = tmp_path / "rig"
-    shutil.copytree(rig, copied, copy_function=shutil.copy)
-    for path in copied.iterdir():
-        os.utime(path, (1e9, 1e9))
-    files = ["--table", str(copied / "table.csv"), "--case", str(copied / "rig.toml")]
-    with pytest.raises(SystemExit):
-        main(["track", str(copied), *files, "--json", "--quiet"])
-    verdict = json.loads(capsys.readouterr().out)["verdict"]
-    with serving(tmp_path, "rig") as server:
+def test_a_watched_folder_of_a_rig_gives_the_verdict_of_track(browser, tmp_path, rig, capsys):
+    folder, files = tmp_path / "arriving", sorted(rig.glob("*.h5"))
+    shutil.copytree(rig, folder, ignore=shutil.ignore_patterns(files[6].name))
+    with serving(tmp_path, str(folder)) as server:
         visit = Visit(browser, server)
         page = visit.go("recordings")
-        page.get_by_text("7 recordings read").wait_for()
+        page.get_by_text("6 recordings read; the folder is being watched.").wait_for()
+        shutil.copy2(files[6], folder)
+        page.get_by_text("7 recordings read; the folder is being watched.").wait_for()
         shown = page.locator(".block.verdict p").first.inner_text()
-        assert plain(shown) == plain(verdict)
         visit.close()
+    given = ["--table", str(folder / "table.csv"), "--case", str(folder / "rig.toml")]
+    with pytest.raises(SystemExit):
+        main(["track", str(folder), *given, "--json", "--quiet"])
+    assert plain(shown) == plain(json.loads(capsys.readouterr().out)["verdict"])
 
 
 def plain(text):

@@ -454,6 +454,7 @@ def test_a_killed_watch_ends_with_the_store_of_an_uninterrupted_one(monkeypatch)
     from benchmarks import hostile
 
     monkeypatch.setattr(hostile, "PARTS_S", 0.4)
+    monkeypatch.setattr(hostile, "HUGE_S", 60.0)
     lines = hostile.run(0.12, 2, 2, every=0.2, settle=0.3, say=lambda _: None)
     rows = [line.split("|")[1:3] for line in lines if line.startswith("|")]
     values = {name.strip(): value.strip() for name, value in rows}

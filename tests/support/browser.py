@@ -1,6 +1,4 @@
-"""A live page's server and a browser that blocks all requests to other hosts; both report
-errors.
-"""
+"""A live page's server and a browser that finds no other host; both report errors."""
 
 import os
 import re
@@ -19,6 +17,10 @@ TIMEOUT_MS = 60_000
 REQUIRED = (  # if this variable is set, as in CI, a missing browser fails the tests
     "ASPERITY_CHROMIUM"
 )
+ARGUMENTS = (
+    "--no-sandbox",
+    "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",  # no other host is found
+)
 
 
 def missing(reason: str) -> None:
@@ -31,11 +33,17 @@ def missing(reason: str) -> None:
 class Server:
     """A running `asperity page`."""
 
-    def __init__(self, folder: Path, *arguments: str, **environment: str) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        *arguments: str,
+        program: tuple[str, ...] = ("-m", "asperity"),
+        **environment: str,
+    ) -> None:
         self.log = folder / "server.log"
         with self.log.open("w") as log:
             self.process = subprocess.Popen(
-                [sys.executable, "-m", "asperity", "page", *arguments, "--port", "0"],
+                [sys.executable, *program, "page", *arguments, "--port", "0"],
                 stdout=subprocess.PIPE,
                 stderr=log,
                 text=True,
@@ -49,6 +57,7 @@ class Server:
             self.process.communicate()
         assert found, f"{first_line}{self.log.read_text('utf-8')}"
         self.url, self.token = found.groups()
+        self.context = None  # of the browser, which its visits share
 
     @property
     def host(self) -> str:
@@ -76,19 +85,22 @@ class Server:
         return self.log.read_text("utf-8")
 
 
-def write_small_contact(folder: Path) -> str:
-    """Write the default case on few cells and in pure rolling, without a Stribeck curve; return
-    its name.
+def write_small_contact(folder: Path, *, sliding: bool = False) -> str:
+    """Write the default case on few cells; return its name.
+
+    Without sliding, the page computes no Stribeck curve.
     """
-    few = {"grid.cells": [96, 64], "solver.running_cells": 600, "contact.slip": 0.0}
+    few = {"grid.cells": [96, 64], "solver.running_cells": 600}
+    if not sliding:
+        few["contact.slip"] = 0.0
     (folder / "contact.toml").write_text(default_case().with_overrides(few).text, "utf-8")
     return "contact.toml"
 
 
 @contextmanager
-def serving(folder: Path, *arguments: str, **environment: str):
+def serving(folder: Path, *arguments: str, **settings):
     """Run a server; assert at the end that it logged no exception."""
-    server = Server(folder, *arguments, **environment)
+    server = Server(folder, *arguments, **settings)
     try:
         yield server
     finally:
@@ -108,7 +120,7 @@ def chromium():
     if path is None:
         missing("chromium is not installed")
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        browser = playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
         yield browser
         browser.close()
 
@@ -123,21 +135,51 @@ def expect(locator):
     return expected(locator)
 
 
-class Visit:
-    """A page in the browser, its requests to other hosts, and its errors."""
+def new_context(browser, server: Server, *, admitted: bool):
+    """Return a new context of the browser, with the server's cookie if the visitor is admitted."""
+    context = browser.new_context(permissions=["clipboard-read", "clipboard-write"])
+    if admitted:
+        name, _, value = server.cookie["Cookie"].partition("=")
+        cookie = {"name": name, "value": value, "url": server.url, "sameSite": "Strict"}
+        context.add_cookies([cookie])
+    return context
 
-    def __init__(self, browser, server: Server, *, admitted: bool = True, **settings) -> None:
+
+class Visit:
+    """A page in the browser, its requests to other hosts, and its errors.
+
+    Visits of a server share a context, whose cache keeps compiled scripts, unless they are `alone`
+    or not admitted.
+    """
+
+    def __init__(
+        self,
+        browser,
+        server: Server,
+        *,
+        admitted: bool = True,
+        alone: bool = False,
+        width: int = 1280,
+        height: int = 1000,
+        scheme: str = "light",
+    ) -> None:
         self.server, self.foreign, self.errors = server, [], []
-        self.context = browser.new_context(
-            **{"viewport": {"width": 1280, "height": 1000}, **settings}
-        )
-        if admitted:
-            name, _, value = server.cookie["Cookie"].partition("=")
-            cookie = {"name": name, "value": value, "url": server.url, "sameSite": "Strict"}
-            self.context.add_cookies([cookie])
-        self.context.route(re.compile(".*"), self._filter_request)
+        self._window, self._scheme = {"width": width, "height": height}, scheme
+        self._alone = alone or not admitted
+        if self._alone:
+            self.context = new_context(browser, server, admitted=admitted)
+        else:
+            server.context = server.context or new_context(browser, server, admitted=True)
+            self.context = server.context
+        self.open()
+
+    def open(self):
+        """Open an empty page; return it."""
         self.page = self.context.new_page()
+        self.page.set_viewport_size(self._window)
+        self.page.emulate_media(color_scheme=self._scheme)
         self.page.set_default_timeout(TIMEOUT_MS)
+        self.page.on("request", self._log_request)
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.on("console", self._log_error)
         self.page.on("websocket", self._socket)
@@ -145,13 +187,12 @@ class Visit:
             "dialog",
             lambda dialog: (self.errors.append(f"dialog {dialog.message}"), dialog.dismiss()),
         )
+        return self.page
 
-    def _filter_request(self, route):
-        if urlsplit(route.request.url).netloc == self.server.host:
-            route.continue_()
-        else:
-            self.foreign.append(route.request.url)
-            route.abort()
+    def _log_request(self, request):
+        address = urlsplit(request.url)
+        if address.scheme not in ("data", "blob") and address.netloc != self.server.host:
+            self.foreign.append(request.url)
 
     def _socket(self, socket):
         if urlsplit(socket.url).netloc != self.server.host:
@@ -176,7 +217,10 @@ class Visit:
         return page
 
     def close(self):
-        self.context.close()
+        """Close the page, and its context unless others use it; assert that nothing went wrong."""
+        self.page.close()
+        if self._alone:
+            self.context.close()
         assert self.foreign == []
         assert self.errors == []
 

@@ -308,8 +308,9 @@ surfaces = 1
 ).replace('designation = "6206"', 'designation = "6206"\nclearance = "60 um"')
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_study_solves_a_machine_at_every_point(machine, tmp_path):
-    case = machine(SWEPT, {"surface": "flat"})
+    case = machine(SWEPT, {"surface": "flat", "grid.cells": [96, 48]})
     swept = sweep_machine(case, out=tmp_path / "sweep", workers=1)
     assert swept.axes == ("machine.radial_load", "lubricant.temperature")
     loads, temperatures = ([row[key] for row in swept.rows] for key in swept.axes)

@@ -124,7 +124,7 @@ def ball():
         geometry="point", radius=10e-3, load=15.0, length=None, speed=0.05, hardness=1e9
     )
     a = conditions.hertz.half_widths[0]
-    on = Grid((40, 32), (-2.5 * a, -1.8 * a), (1.6 * a, 1.8 * a), periodic=(False, False))
+    on = Grid((32, 24), (-2.5 * a, -1.8 * a), (1.6 * a, 1.8 * a), periodic=(False, False))
     surface = gaussian_surface(
         on, sq=0.3e-6, correlation_length=0.3 * a, rng=np.random.default_rng(3)
     )
@@ -143,7 +143,7 @@ def test_gmres_agrees_with_a_dense_solution(kind, model, yielded):
         solution = solve_contact(conditions, barus(), surface, options=Options(model=model))
     else:
         rough = {
-            "grid.cells": [48, 24],
+            "grid.cells": [36, 20],
             "surface.sq": "2.5 um",
             "surface.correlation_length": "40 um",
         }

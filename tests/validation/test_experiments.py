@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas
 import pytest
 
 from asperity.benchmark import (
@@ -15,6 +16,7 @@ from asperity.benchmark import (
     compare_with,
     load_experiments,
 )
+from asperity.benchmark.experiments import FIT_TOLERANCE
 from asperity.cli import main
 from asperity.contact.conditions import ContactConditions, ElasticPair
 from asperity.core.errors import BadInput
@@ -30,25 +32,47 @@ from asperity.lubricant import (
 
 PAGE = Path(__file__).parents[2] / "docs" / "measured" / "experiment.md"
 LOADED = load_experiments()
+FILMS = Path(__file__).parents[1] / "reference" / "experiment_films.csv"
+STORED = pandas.read_csv(FILMS)
 SETS = {entry.name: entry for entry in LOADED if isinstance(entry, Experiment)}
 
 
 @pytest.mark.parametrize("name", SETS)
-def test_computed_values_agree_as_documented(name):
-    experiment = SETS[name]
-    comparison = compare_with(experiment)
-    assert comparison.mean == pytest.approx(experiment.mean, abs=0.004)
-    assert comparison.scatter == pytest.approx(experiment.scatter, abs=0.003)
-    assert comparison.isothermal_scatter == pytest.approx(experiment.isothermal_scatter, abs=0.003)
-    assert (comparison.fitted_viscosity is None) is not experiment.fits_viscosity
-    known = name in ("fva3-25c", "fva3-54c", "unnamed-100c")
-    assert (comparison.mean_interval is not None) is known
+def test_stored_values_agree_as_documented(name):
+    """`asperity benchmark --against experiment --out FILMS` computes all of them again."""
+    experiment, stored = SETS[name], STORED[STORED["experiment"] == name]
+    assert [point.value for point in experiment.points] == pytest.approx(stored["measured"])
+    assert [point.swept for point in experiment.points] == pytest.approx(stored["swept"])
+    ratios = stored[["ratio", "isothermal_ratio"]].to_numpy()
+    scatter, isothermal_scatter = np.std(ratios / ratios.mean(axis=0), axis=0)
+    assert ratios[:, 0].mean() == pytest.approx(experiment.mean, abs=0.004)
+    assert scatter == pytest.approx(experiment.scatter, abs=0.003)
+    assert isothermal_scatter == pytest.approx(experiment.isothermal_scatter, abs=0.003)
+    if experiment.fits_viscosity:  # that of the case
+        assert abs(ratios[:, 0].mean() - 1.0) < FIT_TOLERANCE
     if name == "fva3-25c":
-        low, high = comparison.mean_interval
+        low, high = (np.mean(stored[end] / stored["measured"]) for end in ("low", "high"))
         assert low < 1.0 < high
         assert experiment.scatter <= 0.027
-        widths = [(p.high - p.low) / p.computed for p in comparison.points]
+        widths = (stored["high"] - stored["low"]) / stored["computed"]
         assert 0.15 < np.median(widths) < 0.25  # alpha to 20 %, and film ~ alpha^0.5
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_computed_values_are_the_stored_ones(name):
+    """At the ends of a set and in its middle."""
+    stored = STORED[STORED["experiment"] == name]
+    chosen = sorted({0, len(stored) // 2, len(stored) - 1})
+    points = tuple(SETS[name].points[number] for number in chosen)
+    comparison = compare_with(replace(SETS[name], points=points, fits_viscosity=False))
+    known = stored["low"].notna().all()
+    assert known == (name in ("fva3-25c", "fva3-54c", "unnamed-100c"))
+    assert comparison.fitted_viscosity is None
+    for point, (_, row) in zip(comparison.points, stored.iloc[chosen].iterrows(), strict=True):
+        for key in ("ratio", "isothermal_ratio"):
+            assert getattr(point, key) == pytest.approx(row[key], rel=1e-3)
+        if known:
+            assert (point.low, point.high) == pytest.approx((row["low"], row["high"]), rel=1e-2)
 
 
 def test_the_page_states_every_set():
@@ -134,9 +158,12 @@ def test_the_command_compares_a_folder(tmp_path, monkeypatch, capsys):
     fitted = few.replace("fits_viscosity = false", "fits_viscosity = true")
     Path("sets", "few.toml").write_text(fitted.replace("[0.07135", "# [0.07135"), "utf-8")
     with pytest.raises(SystemExit) as end:
-        main(arguments[:5])
+        main([*arguments[:5], "--json"])
     assert not end.value.code
-    assert capsys.readouterr().out.startswith("1 measured values in 1 sets: largest scatter")
+    result = json.loads(capsys.readouterr().out)
+    assert result["verdict"].startswith("1 measured values in 1 sets: largest scatter")
+    assert result["sets"][0]["fitted_viscosity"] > 0.0
+    assert result["sets"][0]["mean_interval"] is None
     with pytest.raises(SystemExit) as end:
         main([*arguments[:5], "--out", "a.png"])
     assert end.value.code == 2
