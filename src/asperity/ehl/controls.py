@@ -235,15 +235,15 @@ class TimeMarching:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Meniscus:
-    """Time steps that move the front of the oil ahead of a starved contact to its place."""
+    """Time steps to the steady meniscus ahead of a starved contact."""
 
-    front: float = 4.0  # gap at the first front, in the layer's thickness ...
+    front: float = 4.0  # gap at the initial meniscus, in the layer's thickness ...
     front_film: float = 2.0  # ... or in the central film, if that is more
     first_length: float = 0.5  # the oil's path in one step, in half-widths ...
     min_length: float = 1e-3
-    forcing: float = 0.1  # imbalance of a time step, in that of the steady contact before it
-    max_newton_steps: int = 15  # in one step: more take longer than shorter steps
-    max_time_steps: int = 1000  # just short of flooded the front drifts slowly
+    forcing: float = 0.1  # mass imbalance of a time step, in that of the steady equations before it
+    max_newton_steps: int = 15  # in one time step; beyond it shorter time steps are faster
+    max_time_steps: int = 1000  # a nearly flooded meniscus moves slowly
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -30,11 +30,7 @@ from asperity.ehl.scales import Scales
 from asperity.ehl.strategies.grid_continuation import Progress, Search
 from asperity.ehl.strategies.mixed_search import COARSE_TO_FINE, ROBUST, MixedSearch
 from asperity.ehl.strategies.oil_state import pressures_of
-from asperity.ehl.strategies.starved_inlet import (
-    emptied_inlet,
-    march_to_steady,
-    passes_less,
-)
+from asperity.ehl.strategies.starved_inlet import emptied_inlet, march_to_steady, passes_less
 from asperity.lubricant import Lubricant, require_liquid
 from asperity.surface import Surface
 
@@ -163,8 +159,11 @@ def solve_mixed(
     if conditions.geometry == "roller":
         search.most_work = SEARCH.max_roller_work * options.max_iterations * finest.roughness.size
     if start is not None:
-        strategy = COARSE_TO_FINE
-        step = search.continue_from(finest, pressures_of(start, finest, scales))
+        strategy, unknowns = COARSE_TO_FINE, pressures_of(start, finest, scales)
+        if options.inlet_layer is None:
+            step = search.continue_from(finest, unknowns)
+        else:
+            step = march_to_steady(search, finest, unknowns)
     else:
         strategy, step = _solve_cold(search, finest, surface, conditions, lubricant)
     solution = search.solution(
@@ -191,13 +190,12 @@ def solve_starved(
 ) -> ContactSolution:
     """Solve a conserving contact with an inlet layer; called by `solve_contact`.
 
-    The guess is the neighbouring solution, if there is one, or else the flooded contact with its
-    inlet emptied. A line contact that passes less than the layer has nowhere to push the rest: it
-    is flooded.
+    The initial guess is the neighbouring solution, if there is one, and then the flooded contact
+    with an emptied inlet. In a line contact no oil flows aside: if the layer is more than the
+    contact passes, it is flooded.
     """
     began = time.perf_counter()
     assert options.inlet_layer is not None
-    assert lubricant is not None
     solve = partial(
         solve_mixed,
         conditions,
@@ -206,28 +204,14 @@ def solve_starved(
         viscosity_factor=viscosity_factor,
         progress=progress,
     )
-    if start is not None:
-        solution = solve(options=options, start=start)
-        if solution.convergence.converged:
-            return solution
-    flooded = solve(options=replace(options, inlet_layer=None))
-    if conditions.endless and passes_less(flooded, options.inlet_layer):
-        return flooded
-    guess = emptied_inlet(flooded, options.inlet_layer)
-    scales = Scales.from_conditions(conditions, lubricant)
-    full_problem = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
-    problem = reduced_problem(full_problem)
-    search = MixedSearch(options, scales.gap, progress)
-    step = march_to_steady(search, problem, pressures_of(guess, problem, scales))
-    solution = search.solution(
-        step,
-        surface,
-        conditions,
-        lubricant,
-        seconds=time.perf_counter() - began,
-        start=guess,
-    )
-    return replace(solution, viscosity_factor=viscosity_factor)
+    solution = None if start is None else solve(options=options, start=start)
+    if solution is None or not solution.convergence.converged:
+        flooded = solve(options=replace(options, inlet_layer=None))
+        if conditions.endless and passes_less(flooded, options.inlet_layer):
+            return flooded
+        solution = solve(options=options, start=emptied_inlet(flooded, options.inlet_layer))
+    taken = replace(solution.convergence, seconds=time.perf_counter() - began)
+    return replace(solution, convergence=taken)
 
 
 def _solve_cold(

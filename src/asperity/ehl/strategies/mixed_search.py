@@ -37,7 +37,7 @@ class MixedSearch(ExactFaceSearch):
     """Strategies of the two-pressure models, with all steps on record."""
 
     imbalance = 0.0  # of the last step, where oil is conserved
-    max_imbalance = np.inf  # of it, at any tolerance
+    max_imbalance = np.inf  # largest one allowed, at any tolerance
 
     def converged(self, tolerance: float, *, check_load: bool = True) -> bool:
         """Return True if the last step met the tolerance; if last, with conserved oil balanced."""

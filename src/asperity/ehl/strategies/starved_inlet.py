@@ -1,4 +1,4 @@
-"""Starved contacts: an initial guess with an emptied inlet, and time steps that move its front."""
+"""Starved contacts: an initial guess with an emptied inlet, and time steps to the steady film."""
 
 from dataclasses import replace
 
@@ -35,16 +35,17 @@ def passes_less(flooded: ContactSolution, layer: InletLayer) -> bool:
 
 
 def march_to_steady(search: MixedSearch, problem: Problem, unknowns: Pressures) -> Step:
-    """Follow the front of the oil in time steps until it stands, and solve the steady contact.
+    """Take time steps until the meniscus ahead of the contact is stationary.
 
-    Newton steps move the front by a cell each, and from afar they alternate. A time step moves it
-    as far as the oil travels; its imbalance has to be a share of the steady one's before it.
+    A steady Newton step moves the meniscus by one cell at most, and far from the solution it
+    oscillates. A time step moves it as far as the oil travels. It is solved until its mass
+    imbalance is a small share of the imbalance of the steady equations before it.
     """
     length, tolerance = MENISCUS.first_length, search.options.tolerance
     robust = replace(problem, exact=False)
     balance = evaluate(robust, unknowns, second_order=False)
     steps_allowed = min(MENISCUS.max_newton_steps, search.options.max_iterations)
-    stands = False
+    stationary = False
     for _ in range(MENISCUS.max_time_steps):
         stepped = replace(robust, past=implicit_step(problem, length, balance.content))
         search.max_imbalance = MENISCUS.forcing * max(balance.imbalance, SEARCH.max_imbalance)
@@ -53,13 +54,13 @@ def march_to_steady(search: MixedSearch, problem: Problem, unknowns: Pressures) 
         if search.converged(CONTINUATION.coarse_tolerance):
             balance = evaluate(robust, unknowns_of(step), second_order=False)
             length *= _growth(step.number)
-            stands = balance.imbalance < SEARCH.max_imbalance and search.converged(tolerance)
+            stationary = balance.imbalance < SEARCH.max_imbalance and search.converged(tolerance)
         else:
             length *= 0.25
-        if stands or length < MENISCUS.min_length:
+        if stationary or length < MENISCUS.min_length:
             break
     search.max_imbalance = np.inf
-    if stands and not problem.exact:  # a steady step would move the front again
+    if stationary and not problem.exact:  # a steady step would move the meniscus again
         step = search.run(robust, iter([replace(step, number=0, balance=balance)]), tolerance, 0)
         if search.converged(tolerance):
             return step
@@ -67,5 +68,5 @@ def march_to_steady(search: MixedSearch, problem: Problem, unknowns: Pressures) 
 
 
 def _growth(steps: int) -> float:
-    """Return the factor of the next time step after one that took so many Newton steps."""
+    """Return the ratio of the next time step to one that needed a number of Newton steps."""
     return 2.0 if steps <= 3 else 1.2 if steps <= 6 else 1.0 if steps <= 8 else 0.5
