@@ -130,7 +130,8 @@ def test_only_solving_needs_oil_and_roughness(asp):
     assert not Path("kept").exists()
 
 
-def test_every_contact_is_solved_and_stored_once(asp):
+def test_every_contact_is_solved_and_stored_once(asp, monkeypatch):
+    monkeypatch.setattr("asperity.machines.solve.solve_case", pytest.fail)  # the worst one again
     arguments = (
         "machine",
         "nu206.toml",

@@ -384,6 +384,25 @@ def test_other_readers_detect_damage_of_a_map_too(mapped, tmp_path):
         zarr.open_array(folder / "fields.zarr" / case_id / "gap", mode="r")[...]
 
 
+def test_stored_runs_have_the_numbers_of_the_table(plan, executor, tmp_path, monkeypatch):
+    monkeypatch.setattr("asperity.study.execute.require_zarr", pytest.fail)  # not needed for runs
+    result = run_study(plan, out=tmp_path, executor=executor, fields=["run"])
+    for row in result.table.itertuples():
+        numbers = result.run(row.case_id).numbers(["load"])
+        assert numbers["clr"] == row.clr
+        assert numbers["car"] == row.car
+    case_id = result.table["case_id"][0]
+    file = tmp_path / "runs" / f"{case_id}.nc"
+    file.write_bytes(file.read_bytes()[:-1])
+    with pytest.raises(UnreadableFile, match="truncated or modified"):
+        result.run(case_id)
+    file.unlink()
+    with pytest.raises(UnreadableFile, match="has no run of case"):
+        result.run(case_id)
+    with pytest.raises(BadInput, match="no finished case"):
+        result.run("../parts")
+
+
 def test_progress_counts_every_case_once(plan, executor):
     entries = []
     run_study(plan, executor=executor, progress=entries.append)
@@ -410,7 +429,7 @@ def test_a_dry_run_estimates_the_remaining_cases_and_stores_nothing(plan, execut
         ({"workers": 0}, "workers must be positive"),
         (
             {"fields": ("gap", "colour")},
-            "fields must be among pressure, gap, in_contact, surface_height, got colour",
+            "fields must be among pressure, gap, in_contact, surface_height, run, got colour",
         ),
     ],
 )

@@ -59,7 +59,10 @@ MergeOption = Annotated[
 ]
 FieldsOption = Annotated[
     str | None,
-    typer.Option(metavar="NAMES", help="Maps to save: pressure,gap,in_contact,surface_height."),
+    typer.Option(
+        metavar="NAMES",
+        help="Fields to save: pressure,gap,in_contact,surface_height,run.",
+    ),
 ]
 DryRunOption = Annotated[
     bool, typer.Option("--dry-run", help="Estimate the cost without computing.")

@@ -8,6 +8,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,13 +18,20 @@ import pandas
 from asperity.case import DEFAULT_SURFACES, DEFAULT_SURFACES_FINE, Case, MachineCase
 from asperity.core.arrays import finite_or_none
 from asperity.core.documents import Json, JsonObject
-from asperity.core.errors import BadInput
+from asperity.core.errors import BadInput, UnreadableFile
 from asperity.core.processes import cores
 from asperity.machine import MachineContact
 from asperity.machines.result import MachineResult, condition_row
 from asperity.results import Run, load_run, solve_case
 from asperity.solution import heats_inlet
-from asperity.study import DONE, StudyPlan, StudyProgress, plan_points, run_study
+from asperity.study import (
+    DONE,
+    StudyPlan,
+    StudyProgress,
+    StudyResult,
+    plan_points,
+    run_study,
+)
 
 ALL_CELLS = 1_000_000  # of all automatic grids together: about two minutes on two processors
 FEWEST_CELLS = 48  # along an axis
@@ -95,7 +103,10 @@ def solve_machine(
     if not moving:
         raise BadInput(f"{case.source}: no contact entrains oil; correct the speeds")
     plan, points = _plan(case, moving)
-    study = run_study(plan, out=out, workers=workers, executor=executor, progress=progress)
+    fields = () if out is None else ("run",)
+    study = run_study(
+        plan, out=out, workers=workers, executor=executor, fields=fields, progress=progress
+    )
     table = study.table.set_index("point")
     rows = tuple(
         {**condition_row(contact, case), **_solved_row(table, points.get(contact.name))}
@@ -105,18 +116,25 @@ def solve_machine(
     if study.folder is None or result.worst.get("clr") is None:
         return result
     point = next(entry for entry in plan.cases if entry.point == points[result.worst["name"]])
-    run = _load_or_solve(plan.case.with_written(point.overrides), study.folder / WORST)
+    run = _worst(plan.case.with_written(point.overrides), study, point.id)
     return replace(result, run=run, seconds=time.perf_counter() - start)
 
 
-def _load_or_solve(case: Case, path: Path) -> Run:
-    """Return a contact with its fields, loaded from `path` or solved and saved there."""
+def _worst(case: Case, study: StudyResult, case_id: str) -> Run:
+    """Return a contact with its fields, saved as the worst one.
+
+    It is solved again if it has several surfaces, whose dynamic stiffness the study leaves out.
+    """
     case = case.among_many
-    if path.exists():
-        stored = load_run(path)
-        if stored.case.text == case.text:
-            return stored
-    run = solve_case(case, surfaces=None, workers=cores(), strict=False)
+    assert study.folder is not None
+    path = study.folder / WORST
+    if path.exists() and (stored := load_run(path)).case.text == case.text:
+        return stored
+    run = None
+    with suppress(UnreadableFile):  # solved before runs were stored, or damaged
+        run = study.run(case_id)
+    if run is None or run.others or run.case.text != case.text:
+        run = solve_case(case, surfaces=None, workers=cores(), strict=False)
     run.save(path)
     return run
 

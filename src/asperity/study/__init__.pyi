@@ -25,8 +25,6 @@ from .evaluate import DONE as DONE
 from .evaluate import CaseStatus as CaseStatus
 from .evaluate import StudyField as StudyField
 from .execute import StudyProgress as StudyProgress
-from .execute import StudyResult as StudyResult
-from .execute import load_study as load_study
 from .execute import merge_studies as merge_studies
 from .execute import run_study as run_study
 from .execute import study_executor as study_executor
@@ -47,6 +45,8 @@ from .ranges import ParameterRange as ParameterRange
 from .ranges import overrides_at as overrides_at
 from .ranges import require_ranges as require_ranges
 from .ranges import stated_value as stated_value
+from .result import StudyResult as StudyResult
+from .result import load_study as load_study
 from .sensitivity_indices import SensitivityMethod as SensitivityMethod
 from .sensitivity_result import Sensitivity as Sensitivity
 from .sensitivity_result import SensitivityOutcome as SensitivityOutcome

@@ -14,10 +14,10 @@ from asperity.core.errors import AsperityError
 from asperity.paper import Anchor
 from asperity.study.curve import WearCurve, sq_points
 from asperity.study.evaluate import DONE
-from asperity.study.execute import StudyResult
 from asperity.study.full_film import with_full_film_limits
 from asperity.study.plan import StudyPlan, plan_points
 from asperity.study.ranges import ParameterRange, overrides_at
+from asperity.study.result import StudyResult
 
 CHECK_SEEDS = 5
 STEP = 0.1  # half-width of the central differences, as a fraction of a range

@@ -22,7 +22,7 @@ from asperity.paper import PAPER_ANCHORS, SPLIT_ANCHOR, Anchor, compare_with_anc
 from asperity.study.anchor_misfit import CHECK_SEEDS, EDGE, MisfitSolver, least_misfit
 from asperity.study.calibration_result import LEARNT_FROM, CalibratedParameter, Calibration
 from asperity.study.curve import SQ_KEY, WearCurve
-from asperity.study.execute import StudyProgress, StudyResult, run_study, study_executor
+from asperity.study.execute import StudyProgress, run_study, study_executor
 from asperity.study.plan import StudyPlan
 from asperity.study.ranges import (
     OPEN_RANGES,
@@ -35,6 +35,7 @@ from asperity.study.ranges import (
     require_ranges,
     stated_value,
 )
+from asperity.study.result import StudyResult
 from asperity.study.sensitivities import PRIOR_VARIANCE, MisfitSlopes
 
 FREE = OPEN_RANGES[:4]  # they control CAR and CLR: cap, correlation length, alpha, inlet

@@ -17,8 +17,9 @@ from asperity.core.displayed import Brief
 from asperity.core.errors import BadInput, require_positive
 from asperity.core.quantities import catalogue
 from asperity.study.evaluate import BOTH_PRESETS, DONE
-from asperity.study.execute import StudyProgress, StudyResult, run_study
+from asperity.study.execute import StudyProgress, run_study
 from asperity.study.plan import plan_points
+from asperity.study.result import StudyResult
 from asperity.trend import StageErrors, Stages, split_stages
 
 SQ_KEY = "surface.sq"

@@ -9,7 +9,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, Literal, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 from threadpoolctl import threadpool_limits
 
@@ -18,27 +18,39 @@ from asperity.core.arrays import Field, finite_or_none
 from asperity.core.documents import Table
 from asperity.core.errors import AsperityError
 from asperity.coupling import Vibration, contact_vibration
+from asperity.ehl import FileContents
 from asperity.results import RUN_GROUPS, Run, solve_case, vibrate_case
 from asperity.solution import heats_inlet
 
 CaseStatus = Literal["done", "not converged", "failed"]
-StudyField = Literal["pressure", "gap", "in_contact", "surface_height"]
+StudyField = Literal["pressure", "gap", "in_contact", "surface_height", "run"]
 DONE, NOT_CONVERGED, FAILED = get_args(CaseStatus)
 FIELDS: tuple[StudyField, ...] = get_args(StudyField)
+RUN = "run"  # the field that is not a map: the whole run, for `load_run`
 BOTH_PRESETS = ("sound", "paper")
 # without the dynamic stiffness, which takes as long as the contact
 QUICK = tuple(group for group in RUN_GROUPS if group not in ("own", "virgin"))
 STILL = tuple(group for group in RUN_GROUPS if group not in ("heat", "stress", "resonance"))
 
 Row = dict[str, Any]
-TimedBatch = tuple[list[tuple[Row, dict[str, Field]]], float]  # results, seconds
+
+
+class Evaluated(NamedTuple):
+    """Row of one case, with the requested maps by name and the contents of its run."""
+
+    row: Row
+    maps: dict[str, Field] | None = None
+    run: FileContents | None = None
+
+
+TimedBatch = tuple[list[Evaluated], float]  # results, seconds
 # the solver has one set of work arrays per process, and an executor may use threads
 _solver_lock = threading.Lock()
 
 
 def evaluate_batch(
     case: Case, kind: str, batch: Sequence[Table], fields: tuple[str, ...] = ()
-) -> list[tuple[Row, dict[str, Field]]]:
+) -> list[Evaluated]:
     """Return rows and requested fields of `case` with each of the batch's overrides.
 
     Linear algebra uses one thread, since the order of summation must not depend on the number of
@@ -56,17 +68,15 @@ def timed_batch(
     return evaluate_batch(case, kind, batch, fields), time.perf_counter() - start
 
 
-def evaluate(
-    case: Case, kind: str, overrides: Table, fields: tuple[str, ...] = ()
-) -> tuple[Row, dict[str, Field]]:
+def evaluate(case: Case, kind: str, overrides: Table, fields: tuple[str, ...] = ()) -> Evaluated:
     """Return the row of one case: `status`, `reason` and every scalar, and the requested fields."""
     try:
         return EVALUATIONS[kind](case_at(case, overrides), fields)
     except AsperityError as refusal:
-        return {"status": FAILED, "reason": str(refusal)}, {}
+        return Evaluated({"status": FAILED, "reason": str(refusal)})
     except Exception as error:  # an internal error must not lose the other cases
         logging.getLogger(__name__).exception("a case of a study failed: %s", overrides)
-        return {"status": FAILED, "reason": f"{type(error).__name__}: {error}"}, {}
+        return Evaluated({"status": FAILED, "reason": f"{type(error).__name__}: {error}"})
 
 
 def case_at(case: Case, overrides: Table) -> Case:
@@ -81,10 +91,8 @@ def case_at(case: Case, overrides: Table) -> Case:
     return case.with_written({"thermal.inlet_heating": heated, **overrides}).among_many
 
 
-def _solve(
-    case: Case, fields: tuple[str, ...], groups: Sequence[str] = QUICK
-) -> tuple[Row, dict[str, Field]]:
-    run = solve_case(case, strict=False)
+def _solve(case: Case, fields: tuple[str, ...], groups: tuple[str, ...] = QUICK) -> Evaluated:
+    run = solve_case(case, strict=False, groups=groups)
     row: Row = {**_status(run), **run.numbers(groups)}
     if run.vibration is not None:
         row["full_load_crf_hz"] = run.vibration.full_load_crf_hz
@@ -95,7 +103,12 @@ def _solve(
         "in_contact": run.solution.in_contact,
         "surface_height": run.solution.surface.heights,
     }
-    return row, {name: maps[name] for name in fields}
+    requested = {name: values for name, values in maps.items() if name in fields}
+    return Evaluated(row, requested, _contents(run, fields))
+
+
+def _contents(run: Run, fields: tuple[str, ...]) -> FileContents | None:
+    return run.contents() if RUN in fields else None
 
 
 def _status(run: Run) -> Row:
@@ -104,23 +117,23 @@ def _status(run: Run) -> Row:
     return {"status": NOT_CONVERGED, "reason": run.convergence_text}
 
 
-def _solve_surfaces(case: Case, _fields: tuple[str, ...]) -> tuple[Row, dict[str, Field]]:
+def _solve_surfaces(case: Case, fields: tuple[str, ...]) -> Evaluated:
     """Return means and intervals over the surfaces set in [solver], as `asperity solve` does."""
     run = solve_case(case, surfaces=None, strict=False, groups=QUICK)
-    return {**_status(run), **run.scalars()}, {}
+    return Evaluated({**_status(run), **run.scalars()}, run=_contents(run, fields))
 
 
-def _solve_dynamic(case: Case, _fields: tuple[str, ...]) -> tuple[Row, dict[str, Field]]:
+def _solve_dynamic(case: Case, _fields: tuple[str, ...]) -> Evaluated:
     """Solve the contact with its own dynamic stiffness and damping, without a vibration record."""
     run = solve_case(case.with_written({"vibration": "none"}), strict=False)
-    return {**_status(run), **replace(run, case=case).numbers(STILL)}, {}
+    return Evaluated({**_status(run), **replace(run, case=case).numbers(STILL)})
 
 
-def _vibrate(case: Case, _fields: tuple[str, ...]) -> tuple[Row, dict[str, Field]]:
-    return {"status": DONE, "reason": "", **vibrate_case(case).scalars()}, {}
+def _vibrate(case: Case, _fields: tuple[str, ...]) -> Evaluated:
+    return Evaluated({"status": DONE, "reason": "", **vibrate_case(case).scalars()})
 
 
-EVALUATIONS: dict[str, Callable[[Case, tuple[str, ...]], tuple[Row, dict[str, Field]]]] = {
+EVALUATIONS: dict[str, Callable[[Case, tuple[str, ...]], Evaluated]] = {
     "solve": _solve,
     "shake": lambda case, fields: _solve(case, fields, RUN_GROUPS),
     "surfaces": _solve_surfaces,

@@ -24,25 +24,28 @@ from itertools import chain, islice, takewhile
 from multiprocessing import get_context
 from pathlib import Path
 
-import pandas
-
-from asperity.core.arrays import Field, usual_float_errors
-from asperity.core.displayed import Displayed
+from asperity.core.arrays import usual_float_errors
 from asperity.core.errors import AsperityError, BadInput, require_positive
-from asperity.core.files import versions
 from asperity.core.notebook import notebook_progress
 from asperity.core.processes import cores, set_up_worker
-from asperity.core.storage import refusing_damaged_content
-from asperity.study.evaluate import DONE, FAILED, FIELDS, Row, TimedBatch, timed_batch
+from asperity.study.evaluate import (
+    DONE,
+    FAILED,
+    FIELDS,
+    RUN,
+    Evaluated,
+    Row,
+    TimedBatch,
+    timed_batch,
+)
 from asperity.study.maps import require_zarr
 from asperity.study.plan import StudyCase, StudyPlan
+from asperity.study.result import StudyResult
 from asperity.study.store import (
     StudyFolder,
-    load_study_folder,
     open_study_folder,
     ordered_table,
     rows_table,
-    study_manifest,
 )
 
 BATCH_S = 2.0  # work in a batch: long against the cost of submitting it, short enough to lose
@@ -72,58 +75,6 @@ class StudyProgress:
         return (self.total - self.kept - self.done) / self.rate if self.done else None
 
 
-@dataclass(frozen=True, repr=False)
-class StudyResult(Displayed):
-    """A study: its plan and one row per finished case, in the order of the plan."""
-
-    plan: StudyPlan
-    table: pandas.DataFrame
-    folder: Path | None = None
-    path: Path | None = None  # of the merged table
-    seconds: float = 0.0
-    computed: int = 0  # in this call; the other rows were stored before
-    remarks: tuple[str, ...] = ()  # on files that are missing
-
-    @property
-    def failures(self) -> pandas.DataFrame:
-        """The rows of failed cases, each with its reason."""
-        rows: pandas.DataFrame = self.table[self.table["status"] != DONE]
-        return rows
-
-    @property
-    def failed(self) -> int:
-        """Number of cases that failed or did not converge."""
-        return len(self.failures)
-
-    @property
-    def missing(self) -> int:
-        """Number of cases not yet computed."""
-        return len(self.plan.cases) - len(self.table)
-
-    @property
-    def versions(self) -> dict[str, str]:
-        """Versions of asperity and its dependencies at the start of the study."""
-        return versions() if self.folder is None else dict(study_manifest(self.folder)["versions"])
-
-    def maps(self, case_id: str) -> dict[str, Field]:
-        """Read the stored maps of a case, each (nx, ny) in SI; see `fields` of `run_study`.
-
-        Raises
-        ------
-        UnreadableFile
-            if no maps are stored or they are damaged.
-        BadInput
-            for a case of another study, or a study in memory.
-        """
-        if self.folder is None:
-            raise BadInput("maps are stored in a study's folder, and this study has none; give out")
-        if case_id not in self.table["case_id"].to_numpy():
-            raise BadInput(
-                f"the study has no finished case {case_id!r}; take one of the column case_id"
-            )
-        return load_study_folder(self.folder).maps(case_id)
-
-
 @usual_float_errors
 def run_study(
     plan: StudyPlan,
@@ -146,7 +97,7 @@ def run_study(
     workers : number of processes, by default one per processor
     shard : (k, n), compute only every n-th case, starting with the k-th
     retry_failed : compute failed cases again
-    fields : maps to store beside the rows, of FIELDS; needs `out`
+    fields : maps to store beside the rows, of FIELDS, or "run" for whole runs; needs `out`
     progress : called after every batch
 
     Raises
@@ -159,13 +110,7 @@ def run_study(
     _require_shard(shard)
     if workers is not None:
         require_positive("workers", workers)
-    unknown = [name for name in fields if name not in FIELDS]
-    if unknown:
-        raise BadInput(f"fields must be among {', '.join(FIELDS)}, got {unknown[0]}")
-    if fields and out is None:
-        raise BadInput("fields need a folder to be stored in; give out")
-    if fields:
-        require_zarr()
+    _require_fields(fields, stored=out is not None)
     start = time.perf_counter()
     progress = progress or notebook_progress("Study", _progress_text)
     with nullcontext() if out is None else open_study_folder(Path(out), plan, shard) as store:
@@ -214,21 +159,6 @@ def merge_studies(
             store.import_parts(Path(folder))
 
 
-def load_study(folder: str | Path) -> StudyResult:
-    """Read a study's folder, finished or not.
-
-    Raises
-    ------
-    UnreadableFile
-        if the folder holds no study or is damaged.
-    """
-    with refusing_damaged_content(Path(folder), "study"):
-        store = load_study_folder(Path(folder))
-        return StudyResult(
-            store.plan, store.table(), store.folder, store.merged, remarks=store.remarks()
-        )
-
-
 @contextmanager
 def study_executor(workers: int | None = None) -> Iterator[Executor]:
     """Provide worker processes for several studies; starting them takes seconds."""
@@ -237,6 +167,16 @@ def study_executor(workers: int | None = None) -> Iterator[Executor]:
         yield pool
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _require_fields(fields: Sequence[str], *, stored: bool) -> None:
+    unknown = [name for name in fields if name not in FIELDS]
+    if unknown:
+        raise BadInput(f"fields must be among {', '.join(FIELDS)}, got {unknown[0]}")
+    if fields and not stored:
+        raise BadInput("fields need a folder to be stored in; give out")
+    if any(name != RUN for name in fields):
+        require_zarr()
 
 
 def _require_shard(shard: tuple[int, int]) -> None:
@@ -306,18 +246,18 @@ class _Work:
     def finish(
         self,
         batch: Sequence[StudyCase],
-        results: Sequence[tuple[Row, dict[str, Field]]],
+        results: Sequence[Evaluated],
         seconds: float,
     ) -> None:
         """Store the results of a batch."""
-        rows, fields = [], {}
-        for case, (row, maps) in zip(batch, results, strict=True):
-            rows.append({"case_id": case.id, "attempt": self.attempts.get(case.id, 1), **row})
-            fields[case.id] = maps
+        rows = [
+            {"case_id": case.id, "attempt": self.attempts.get(case.id, 1), **result.row}
+            for case, result in zip(batch, results, strict=True)
+        ]
         if self.store is None:
             self.rows += rows
         else:
-            self.store.write_batch(rows, fields)
+            self.store.write_batch(rows, results)
         mean_s = seconds / len(batch)
         self.case_s = mean_s if self.case_s is None else 0.7 * self.case_s + 0.3 * mean_s
         self.done += len(batch)
@@ -339,7 +279,7 @@ class _Work:
                     "status": FAILED,
                     "reason": "the process that computed it died: killed, or out of memory",
                 }
-                self.finish([case], [(row, {})], 0.0)
+                self.finish([case], [Evaluated(row)], 0.0)
             else:
                 self.waiting.append(case)
 

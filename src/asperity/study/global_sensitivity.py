@@ -20,7 +20,7 @@ from asperity.case import Case
 from asperity.core.arrays import Field
 from asperity.core.errors import AsperityError, BadInput, require_choice, require_positive
 from asperity.study.evaluate import DONE
-from asperity.study.execute import StudyProgress, StudyResult, run_study
+from asperity.study.execute import StudyProgress, run_study
 from asperity.study.full_film import is_full_film, with_full_film_limits
 from asperity.study.plan import SEED_KEYS, StudyPlan, plan_points
 from asperity.study.ranges import (
@@ -32,6 +32,7 @@ from asperity.study.ranges import (
     require_ranges,
     stated_value,
 )
+from asperity.study.result import StudyResult
 from asperity.study.sensitivity_indices import (
     FEWEST_BLOCKS,
     SIZES,

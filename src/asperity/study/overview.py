@@ -24,8 +24,8 @@ from asperity.results import Run, solve_case
 from asperity.study.axes import SweptAxis, swept_axis, varying_outputs
 from asperity.study.curve import SQ_KEY, WearCurve, curve_from_study, is_wear_study
 from asperity.study.evaluate import BOTH_PRESETS, DONE, case_at
-from asperity.study.execute import StudyResult
 from asperity.study.plan import SEED_KEYS, as_written
+from asperity.study.result import StudyResult
 
 MAX_MAPS = 8  # as in the paper's Figs 5 and 6
 MAX_REASONS = 10

@@ -9,8 +9,8 @@ import pandas
 from asperity.case import Case
 from asperity.core.quantities import quantity
 from asperity.study.calibration_result import as_json
-from asperity.study.execute import StudyResult
 from asperity.study.ranges import ParameterRange
+from asperity.study.result import StudyResult
 from asperity.study.sensitivity_indices import SensitivityMethod
 
 RANKED_BY: dict[SensitivityMethod, str] = {"morris": "mu_star", "sobol": "st"}

@@ -8,7 +8,7 @@ computed.
 import hashlib
 import json
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from importlib.metadata import version
@@ -31,12 +31,13 @@ from asperity.core.storage import (
     write_json,
     write_table,
 )
-from asperity.study.evaluate import Row
+from asperity.results import Run, load_run
+from asperity.study.evaluate import Evaluated, Row
 from asperity.study.maps import MAPS, read_maps, write_maps
 from asperity.study.plan import SEED_KEYS, StudyPlan, plan_points
 
 FORMAT = 2  # increases when readers of the previous format cannot read the folder
-PARTS, TABLE = "parts", "table.parquet"
+PARTS, TABLE, RUNS = "parts", "table.parquet", "runs"
 MAPPED = b"mapped"  # key of a part's metadata: cases whose maps were stored
 STALE_S = 3600.0  # age from which on no other shard can still be writing a temporary file
 _LEADING = ("case_id", "number", "point", "realisation", "status", "reason")
@@ -60,21 +61,40 @@ class StudyFolder:
                     newest[case_id] = status, attempt
         return newest
 
-    def write_batch(self, rows: Sequence[Row], maps: Mapping[str, Mapping[str, Field]]) -> None:
+    def write_batch(self, rows: Sequence[Row], results: Sequence[Evaluated]) -> None:
         """Write a finished batch, fields first; `AsperityError` if the system refuses to write."""
-        for case_id, fields in maps.items():
-            if fields:
-                write_maps(self.folder, self.design, case_id, fields)
+        mapped = []
+        for row, result in zip(rows, results, strict=True):
+            case_id = row["case_id"]
+            if result.maps:
+                write_maps(self.folder, self.design, case_id, result.maps)
+                mapped.append(case_id)
+            if result.run is not None:
+                make_folder(self.folder / RUNS)
+                result.run.save(self.run_path(case_id))
         names = hashlib.sha256(
             "".join(f"{row['case_id']}{row['attempt']}" for row in rows).encode()
         ).hexdigest()
-        mapped = json.dumps([case_id for case_id, fields in maps.items() if fields])
-        table = rows_table(rows).replace_schema_metadata({MAPPED: mapped})
+        table = rows_table(rows).replace_schema_metadata({MAPPED: json.dumps(mapped)})
         self._write(self.folder / PARTS / f"{names[:20]}.parquet", table)
 
     def maps(self, case_id: str) -> dict[str, Field]:
         """Read the maps of a case; UnreadableFile if there are none or they are damaged."""
         return read_maps(self.folder, self.design, case_id)
+
+    def run(self, case_id: str) -> Run:
+        """Load the run of a case; UnreadableFile if there is none or it is damaged."""
+        path = self.run_path(case_id)
+        if not path.exists():
+            raise UnreadableFile(
+                f"{self.folder} has no run of case {case_id}; run the study with --fields run in a "
+                "new folder, because finished cases are not computed again"
+            )
+        return load_run(path)
+
+    def run_path(self, case_id: str) -> Path:
+        """Return the file of a case's run."""
+        return self.folder / RUNS / f"{case_id}.nc"
 
     def remarks(self) -> tuple[str, ...]:
         """Return a remark on maps that were stored and are missing."""

@@ -2,8 +2,8 @@
 
 from asperity.study.cost import StudyCost
 from asperity.study.curve import WearCurve, curve_from_study, is_wear_study
-from asperity.study.execute import StudyResult
 from asperity.study.plan import StudyPlan
+from asperity.study.result import StudyResult
 
 
 def study_verdict(result: StudyResult) -> str:
