@@ -29,7 +29,7 @@ from asperity.app.session import Trial
 from asperity.core.quantities import quantity
 
 BLUE, VERMILION, GREEN, GREY = "#2b8fd0", "#d55e00", "#00a577", "#808893"
-# FILM_COLOURS of the report, without yellow, the colour of contact
+# `FILM_COLOURS` of `report.style`, without yellow, the colour of contact
 FILMS = Viridis256[:208]
 CHANGES = interp_palette(RdBu11, 256)  # thinner: blue, thicker: red
 CONTACT = (0xF7, 0xDC, 0x4A)

@@ -40,7 +40,7 @@ from asperity.app.widgets import (
 )
 from asperity.case import read_amount
 from asperity.core.arrays import Field
-from asperity.core.coverage import NORMAL_FACTOR
+from asperity.core.coverage import NORMAL_FACTOR, PERCENT
 from asperity.core.errors import BadInput
 from asperity.core.quantities import quantity
 
@@ -137,13 +137,13 @@ class RecordingsView:
             "x", "crf", source=self._line, size=8, color="colour", legend_field="stage"
         )
         # ends wider than the dots, to be seen where an interval is narrower than a dot
-        bars: Look = {"source": self._line, "color": GREY, "legend_label": "90 % interval"}
+        bars: Look = {"source": self._line, "color": GREY, "legend_label": f"{PERCENT} interval"}
         self.track.segment("x", "low", "x", "high", **bars)
         for end in ("low", "high"):
             self.track.scatter("x", end, marker="dash", size=18, **bars)
         legend_above(self.track)
         unit = quantity("crf_hz").display
-        crf = f"@crf{{0.0}} {unit} (90 %: @low{{0.0}} to @high{{0.0}})"
+        crf = f"@crf{{0.0}} {unit} ({PERCENT}: @low{{0.0}} to @high{{0.0}})"
         self.track.add_tools(
             HoverTool(renderers=[dots], tooltips=[("CRF", crf), ("recording", "@file")])
         )

@@ -89,7 +89,7 @@ class Comparison:
 
     @property
     def mean_interval(self) -> tuple[float, float] | None:
-        """90 % interval of `mean` from the limits of the computed values; None without limits.
+        """Interval of `mean` from the limits of the computed values; None without limits.
 
         Those of all points move together, because they have one pressure-viscosity coefficient.
         """

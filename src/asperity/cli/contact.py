@@ -23,6 +23,7 @@ from asperity.cli.options import (
 from asperity.cli.output import Block, Row, SolverSteps, known_rows, progress, show, table, text
 from asperity.cli.terminal.browser import open_page
 from asperity.core import files, processes
+from asperity.core.coverage import PERCENT
 from asperity.core.documents import Table
 from asperity.core.errors import AsperityError
 from asperity.core.quantities import mark_rolling, quantity
@@ -37,7 +38,7 @@ MAIN = (  # quantities that `solve` prints without --all
     *("friction_coefficient", "flash_temperature_max_k", "von_mises_max_pa", "crf_hz", "crfa"),
 )
 CONVERGENCE = ("converged", "iterations")  # stated by the row of the solver
-INTERVAL = ", 90 % interval"  # of a number whose own row states it
+INTERVAL = f", {PERCENT} interval"  # of a number whose own row states it
 
 
 @app.command()

@@ -38,6 +38,7 @@ from asperity.cli.options import (
 from asperity.cli.output import Block, columns, named_path, progress, show, table, written
 from asperity.cli.terminal.browser import open_page, require_page
 from asperity.core import processes
+from asperity.core.coverage import PERCENT
 from asperity.core.errors import BadInput, require_choice
 from asperity.core.quantities import NO_VALUE, quantity
 
@@ -361,8 +362,8 @@ def _posterior(result: "Inference") -> Block:
         [
             f"at {quantity('load_n').text(point.load_n)}, {speed}",
             "median",
-            "90 %",
-            "90 %, laws exact",
+            PERCENT,
+            f"{PERCENT}, laws exact",
             "bits",
         ],
         rows,

@@ -24,6 +24,7 @@ from asperity.cli.output import Block, Row, columns, named_path, progress, show,
 from asperity.cli.study import study_progress
 from asperity.cli.terminal.browser import open_page, require_opened
 from asperity.core import files
+from asperity.core.coverage import PERCENT
 from asperity.core.documents import Table
 from asperity.core.errors import AsperityError
 from asperity.core.quantities import NO_VALUE, UNKNOWN, mark_rolling, quantity
@@ -225,7 +226,7 @@ def _contact_notes(result: "MachineResult") -> Iterator[str]:
         count = f"{len(rolling)} of {len(result.rows)}"
         yield f"{count} contacts roll without sliding: no sliding friction, no flash temperature."
     if any(row.get("clr") is not None and row.get("clr_low") is None for row in result.rows):
-        yield "The 90 % intervals of CLR that are missing in the table are not determined."
+        yield f"The {PERCENT} intervals of CLR that are missing in the table are not determined."
     if result.solved:
         yield "--json and the page of --out DIR have all quantities and intervals."
 

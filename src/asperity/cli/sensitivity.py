@@ -23,6 +23,7 @@ from asperity.cli.options import (
 from asperity.cli.output import Block, columns, show, table
 from asperity.cli.study import study_progress
 from asperity.core import files
+from asperity.core.coverage import PERCENT
 from asperity.core.errors import BadInput
 from asperity.core.quantities import NO_VALUE
 
@@ -311,7 +312,7 @@ def _anchors(result: "Calibration") -> Block:
             rows.append(
                 ["*" if name in fitted else "", name, *numbers, f"{mean} ({low} to {high})"]
             )
-    titles = ["", "", "target", "as given", "fitted", "checked (90 % over surfaces)"]
+    titles = ["", "", "target", "as given", "fitted", f"checked ({PERCENT} over surfaces)"]
     yield from columns(titles, rows, left=2)
     yield "  * fitted; checked: on the case's own grid, on surfaces not used in the fit"
 

@@ -1,4 +1,8 @@
-"""`asperity track` and `watch`: measured recordings, from files to a verdict."""
+"""`asperity track` and `watch`: measured recordings, from files to a verdict.
+
+A new option: `cli.options`, both commands and `_track_settings` here, `monitoring.settings`, and
+`WITHOUT_RECORDINGS` of `cli.monitored.series` if tables do not use it.
+"""
 
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager

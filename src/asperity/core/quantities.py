@@ -13,6 +13,7 @@ from dataclasses import dataclass, fields, replace
 from functools import cache
 from typing import Any, SupportsFloat, get_type_hints
 
+from asperity.core.coverage import PERCENT
 from asperity.core.documents import Table
 from asperity.core.errors import require_positive
 
@@ -157,7 +158,7 @@ class Quantity:
 
     @property
     def ends(self) -> tuple[str, str]:
-        """Keys of the ends of the 90 % interval: `crf_low_hz` and `crf_high_hz` of `crf_hz`."""
+        """Keys of the ends of the interval: `crf_low_hz` and `crf_high_hz` of `crf_hz`."""
         unit = next((end for end in ("_hz", "_m") if self.key.endswith(end)), "")
         stem = self.key.removesuffix(unit)
         return f"{stem}_low{unit}", f"{stem}_high{unit}"
@@ -297,7 +298,8 @@ def catalogue() -> dict[str, Quantity]:
     """Return all quantities by key, in the order of tables."""
     from importlib.resources import files  # slow import, not needed by `asperity --help`
 
-    lines = files("asperity.core").joinpath("quantities.csv").read_text("utf-8").splitlines()
+    text = files("asperity.core").joinpath("quantities.csv").read_text("utf-8")
+    lines = text.replace("{coverage}", PERCENT).splitlines()
     return {
         row["key"]: Quantity(detail=bool(row.pop("detail")), **row) for row in csv.DictReader(lines)
     }

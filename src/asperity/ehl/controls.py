@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StepLimits:
-    """Largest changes of one Newton step; shared by all models."""
+    """Largest changes of one Newton step, of all models; further ones are in `MixedNewton`."""
 
     max_pressure_step: float = 0.5  # of a cell, in p_h ...
     max_relative_step: float = 0.5  # ... or in its own pressure: elastic asperities reach 100 p_h
@@ -178,7 +178,7 @@ class GridContinuation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DiscretisationError:
-    """90 % intervals from the last grids; they decide error bars (benchmark row: intervals)."""
+    """Error bars from the last grids, calibrated for `core.coverage` (benchmark row: intervals)."""
 
     forward: float = 2.5  # in the difference d of the last two grids, in its direction ...
     backward: float = 1.5  # ... and against it

@@ -140,7 +140,7 @@ FIGURES = tuple(field.name for field in fields(Figures))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GridError(Figures):
-    """Discretisation error of the key results: half-widths of 90 % intervals.
+    """Discretisation error of the key results: half-widths of intervals.
 
     `lean` is the offset of each interval's centre from the value: a finer grid mostly continues in
     the direction of the last refinement.

@@ -13,7 +13,7 @@ NONE: Sides = (0.0, 0.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Uncertainty:
-    """A number, and its 90 % error below and above it by each source.
+    """A number, and its error below and above it by each source.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Uncertainty:
 
     @property
     def interval(self) -> tuple[float, float] | None:
-        """Total 90 % interval within the range; None if a part is unknown.
+        """Total interval within the range; None if a part is unknown.
 
         Independent parts add in quadrature.
         """

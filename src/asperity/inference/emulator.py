@@ -20,7 +20,7 @@ import pandas
 
 from asperity.case import MOST_POINTS
 from asperity.core.arrays import Field
-from asperity.core.coverage import NORMAL_FACTOR
+from asperity.core.coverage import NORMAL_FACTOR, PERCENT
 from asperity.core.documents import JsonObject
 from asperity.core.errors import AsperityError, BadInput, UnreadableFile
 from asperity.core.files import make_folder, user_cache
@@ -53,7 +53,7 @@ class EmulatorQuality:
     """Cross-validation error of an emulated output, in its own unit.
 
     `error` is the rms difference of held-out means from the emulator; `coverage` the fraction
-    within the stated 90 % interval; `scatter` the deviation of one surface from its point's mean;
+    within the stated interval; `scatter` the deviation of one surface from its point's mean;
     `scatter_of_mean` that of a point's mean, the `error` of a perfect emulator.
     """
 
@@ -138,7 +138,7 @@ class Emulator:
         return (
             f"Emulator of {self.points} contacts{added}, {self.surfaces} surfaces each: "
             f"cross-validation error of CLR {100 * clr.error:.1f} points (rms; scatter of one "
-            f"surface {100 * clr.scatter:.1f}), coverage of the 90 % interval "
+            f"surface {100 * clr.scatter:.1f}), coverage of the {PERCENT} interval "
             f"{100 * clr.coverage:.0f} %. Its grid has {self.cells[0]} x {self.cells[1]} cells."
             f"{finer}"
         )

@@ -1,4 +1,4 @@
-"""Posterior estimates: median, 90 % interval and information gain over the prior."""
+"""Posterior estimates: median, interval and information gain over the prior."""
 
 import math
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ CROWDED = (
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """Median and 90 % interval in SI, and information gain over the prior.
+    """Median and interval in SI, and information gain over the prior.
 
     `against` is "low" or "high" if that end of the prior limits the posterior.
     """

@@ -10,7 +10,7 @@ from scipy.special import logsumexp
 
 from asperity.case import read_amount
 from asperity.core.arrays import Field
-from asperity.core.coverage import QUANTILES
+from asperity.core.coverage import PERCENT, QUANTILES
 from asperity.core.documents import JsonObject
 from asperity.core.errors import AsperityError, BadInput
 from asperity.core.quantities import quantity
@@ -48,7 +48,7 @@ class Limit(NamedTuple):
 
 
 class Interval(NamedTuple):
-    """90 % interval and median, SI."""
+    """Interval and median, SI."""
 
     low: float
     median: float
@@ -142,7 +142,7 @@ class Forecast:
             return sentence + "."
         time = self.time
         sentence += (
-            f", if so after {time.low:.3g} to {time.high:.3g} (90 %; median {time.median:.3g})"
+            f", if so after {time.low:.3g} to {time.high:.3g} ({PERCENT}; median {time.median:.3g})"
         )
         rough = (
             f"; approximate, effective sample size {self.effective:.0f}"
@@ -358,7 +358,7 @@ def _forecast(models: list[_Model], limit: Limit, seed: int) -> Forecast:
 
 
 def _bands(limit: Limit, series: VisitSeries, courses: Field, step: float) -> Bands:
-    """Return the 90 % interval of courses (n, visits + steps)."""
+    """Return the interval of courses (n, visits + steps)."""
     x = np.concatenate([series.x, series.x[-1] + step * np.arange(1, STEPS + 1)])
     return Bands(*limit, x, series.x[-1], np.quantile(courses, QUANTILES, axis=0))
 

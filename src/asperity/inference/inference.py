@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from asperity.core.arrays import Field
+from asperity.core.coverage import PERCENT
 from asperity.core.displayed import Brief
 from asperity.core.documents import JsonObject
 from asperity.core.quantities import quantity
@@ -20,7 +21,7 @@ from asperity.inference.posterior import ContactPool, Draws, ModelEvidence
 from asperity.inference.settings import Setting
 from asperity.results import BOUNDARY_FROM, FULL_FILM_BELOW
 
-STAGES = ("full film", "mixed lubrication", "boundary lubrication")
+REGIMES = ("full film", "mixed lubrication", "boundary lubrication")
 KEY_QUANTITIES = (CLR, "sq_m")  # of the verdict
 IDENTIFIED_BITS = (
     1.0  # information gain from which on CLR or Sq counts as identified: the range is halved
@@ -38,8 +39,8 @@ class PointEstimates:
         "load",
         "speed",
         "recordings",
-        "CLR, 90 %",
-        "mean film, 90 %",
+        f"CLR, {PERCENT}",
+        f"mean film, {PERCENT}",
         "stage",
     )
 
@@ -282,7 +283,7 @@ class Inference(Brief):
                 entry = quantity(key)
                 interval = entry.interval(estimate.low, estimate.high)
                 value = (
-                    f"{entry.text(estimate.median)} ({interval}, 90 %)"
+                    f"{entry.text(estimate.median)} ({interval}, {PERCENT})"
                     if estimate.information_bits >= IDENTIFIED_BITS
                     else "not identified"
                 )
@@ -330,7 +331,7 @@ def stage_probabilities(clr: Field) -> dict[str, float]:
     """Return the probability of each lubrication regime from draws of CLR."""
     full = float(np.mean(clr < FULL_FILM_BELOW))
     boundary = float(np.mean(clr >= BOUNDARY_FROM))
-    return dict(zip(STAGES, (full, 1.0 - full - boundary, boundary), strict=True))
+    return dict(zip(REGIMES, (full, 1.0 - full - boundary, boundary), strict=True))
 
 
 def _most_frequent(excluded: tuple[tuple[str, str], ...]) -> str:

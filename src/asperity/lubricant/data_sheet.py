@@ -238,7 +238,7 @@ class OilSheet:
 
     @property
     def alpha_error(self) -> float:
-        """Half of the 90 % interval of alpha, relative."""
+        """Half of the interval of alpha, relative."""
         if self.alpha is not None:
             return STATED_ALPHA_ERROR
         return 0.5 * NORMAL_FACTOR * self.estimator.spread_of(self.base)

@@ -25,7 +25,7 @@ class Bands:
     ----------
     key, limit : quantity, and the limit that it should not cross
     x, last : visits and later times; the last visit
-    ends : 90 % interval with the median in between, shape (3, times): at each visit as known then,
+    ends : interval with the median in between, shape (3, times): at each visit as known then,
         and of the forecast
     """
 

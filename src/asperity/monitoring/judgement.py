@@ -286,7 +286,7 @@ def _incomparable_units(units: set[str]) -> list[str]:
 
 
 def _with_load_share(tracked: list[TrackedRecording], target: Target) -> list[TrackedRecording]:
-    """Add the asperities' load share and its 90 % interval, if the contact model reads CRF."""
+    """Add the asperities' load share and its interval, if the contact model reads CRF."""
     crf, crf_std = np.array(
         [(recording.resonance.crf_hz, recording.resonance.crf_std) for recording in tracked]
     ).T

@@ -1,4 +1,4 @@
-"""Notification of changes of state: by a command, a web address or an MQTT topic.
+"""Notification of changes of state: by a command (such as e-mail), web address or MQTT topic.
 
 A notification is stored before it is sent, and stays until it has been delivered (at least once);
 a failed one is sent again.

@@ -54,7 +54,7 @@ class TrackedRecording:
     """One recording of a series, on one sensor or simultaneously on several.
 
     `resonance` states the reason if none was found or the recording is not usable. `clr` and its
-    90 % interval follow from CRF by the contact model, nan without one. `damping_reason` states why
+    interval follow from CRF by the contact model, nan without one. `damping_reason` states why
     the width of the line is not a damping ratio; empty if it is. `crf_reference_hz` and
     `damping_reference` are reduced to load, speed and temperature of the first recordings. `label`
     is the stage, `state` the alarm's state after this recording. With several sensors `on_sensors`

@@ -104,7 +104,7 @@ class Anchor:
 def compare_with_anchors(
     curve: CurveOverSq, anchors: Sequence[Anchor] | None = None
 ) -> pandas.DataFrame:
-    """Return a table with a row per anchor: published value, ours with 90 % interval, deviation.
+    """Return a table with a row per anchor: published value, ours with interval, deviation.
 
     `met` is True if the deviation is within the tolerance, and `possible` if it would be for some
     value of the interval. Both are False if the curve has no value (Sq not computed, no stages).

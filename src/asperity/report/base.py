@@ -17,6 +17,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 from matplotlib.figure import Figure
 
+from asperity.core.coverage import PERCENT
 from asperity.core.files import atomic_write, make_folder, require_writable
 from asperity.core.quantities import UNKNOWN, Quantity, in_print, quantity
 from asperity.paper import CITATION
@@ -196,6 +197,7 @@ def render(template: str, *, script: str = "", **values: object) -> str:
         "paper": CITATION,
         "quantity": quantity,
         "heading": heading,
+        "coverage": PERCENT,
     }
     return environment.get_template(template).render(**shared, **values)
 

@@ -94,7 +94,7 @@ def plain_log_labels(axes: Axes) -> None:
 
 
 def mark_split(axes: Axes, stages: Stages | None, name: str | None = None) -> None:
-    """Mark the split of a trend and its 90 % interval, if there is one."""
+    """Mark the split of a trend and its interval, if there is one."""
     if stages is not None and stages.found:
         axes.axvspan(*stages.interval, color=SPLIT_STRIP, linewidth=0, zorder=0, label=name)
         axes.axvline(stages.split, color=SPLIT_COLOUR, linewidth=1.0, zorder=0)

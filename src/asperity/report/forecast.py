@@ -2,6 +2,7 @@
 
 from matplotlib.axes import Axes
 
+from asperity.core.coverage import PERCENT
 from asperity.core.quantities import quantity
 from asperity.monitoring import Bands
 from asperity.report.base import Exhibit
@@ -32,7 +33,7 @@ def forecast_exhibit(bands: Bands, x_label: str) -> Exhibit:
     return Exhibit(
         "ahead",
         draw,
-        "Median and 90 % interval. Up to the last recording: the state inferred at each time. "
-        "After it: the forecast, with the drift and its scatter continuing as observed.",
+        f"Median and {PERCENT} interval. Up to the last recording: the state inferred at each "
+        "time. After it: the forecast, with the drift and its scatter continuing as observed.",
         f"{entry.name} over the series of recordings, its forecast and the limit",
     )

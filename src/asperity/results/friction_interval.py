@@ -1,4 +1,4 @@
-"""90 % interval of the friction coefficient of a solved contact, by part."""
+"""Interval of the friction coefficient of a solved contact, by part."""
 
 import math
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ KEY = "friction_coefficient"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrictionInterval:
-    """Friction coefficient and its 90 % error below and above it, by part.
+    """Friction coefficient and its error below and above it, by part.
 
     `oil` covers viscosity and shear stress at contact pressure; `heat` the film warmer than the
     oil's viscosity; `numerical` cells, iteration and, of a running contact, the finite time (None

@@ -17,7 +17,7 @@ FILMS = {"h_central_m": "h_central", "h_mean_m": "h_mean", "h_min_m": "h_min"}  
 
 @dataclass(frozen=True)
 class AlphaEffect:
-    """Film and load share at both ends of the 90 % interval of an estimated alpha.
+    """Film and load share at both ends of the interval of an estimated alpha.
 
     Parameters
     ----------

@@ -171,7 +171,7 @@ class Run(Derived, Displayed):
 
     @property
     def damping_error(self) -> float | None:
-        """Half of the 90 % interval of the damping ratio on a further surface."""
+        """Half of the interval of the damping ratio on a further surface."""
         rows = (read(self, map(quantity, [DAMPING])), *self.others)
         values = [float(value) for row in rows if (value := row.get(DAMPING)) is not None]
         return half_interval(values) if len(values) > 1 else None
@@ -306,7 +306,7 @@ class Run(Derived, Displayed):
             yield f"There is no stiffness of virgin roughness: {reason}."
 
     def verdict(self) -> str:
-        """Return one sentence on the contact's state: means over surfaces with 90 % intervals.
+        """Return one sentence on the contact's state: means over surfaces with intervals.
 
         Full film: asperities carry less than 1 % of the load; boundary lubrication: 90 % or more;
         mixed between. Smooth bodies have solid contact, no asperities. If the grid does not
@@ -379,5 +379,8 @@ class Run(Derived, Displayed):
         return run_contents(self)
 
     def save(self, path: str | Path) -> Path:
-        """Save the run with its case as one netCDF file (atomically), and return the path."""
+        """Save the run with its case as one netCDF file (atomically), and return the path.
+
+        The format is `FileContents` of `ehl.contact_solution`; `load_run` reads it.
+        """
         return self.contents().save(path)

@@ -57,7 +57,7 @@ def mean_row(rows: Sequence[Row]) -> dict[str, Any]:
 
 
 def prediction_interval(values: Sequence[float], *, share: bool) -> tuple[float, Sides]:
-    """Return the mean and Student's 90 % prediction interval for a further surface (below, above).
+    """Return the mean and Student's prediction interval for a further surface (below, above).
 
     A `share` is transformed to log odds, so that the interval stays within 0 to 1.
     """
@@ -73,7 +73,7 @@ def prediction_interval(values: Sequence[float], *, share: bool) -> tuple[float,
 
 
 def half_interval(values: Sequence[float]) -> float:
-    """Return half of the 90 % prediction interval of an unbounded number on a further surface."""
+    """Return half of the prediction interval of an unbounded number on a further surface."""
     below, above = prediction_interval(values, share=False)[1]
     return 0.5 * (below + above)
 

@@ -1,5 +1,6 @@
 """Uncertainty of a contact's numbers as text: in a sentence, and by part for tables."""
 
+from asperity.core.coverage import PERCENT
 from asperity.core.quantities import NO_VALUE, Quantity, quantity
 from asperity.ehl import ContactError, ContactSolution, Sides, Uncertainty
 from asperity.results.friction_interval import FrictionInterval
@@ -35,14 +36,14 @@ def basis(error: ContactError, *, snapshot: bool) -> str:
     if error.running:
         tracks = "track" if error.surfaces == 1 else "tracks"
         return (
-            f"mean over time of {error.surfaces} {tracks} of running roughness, 90 % intervals of "
-            "this mean"
+            f"mean over time of {error.surfaces} {tracks} of running roughness, {PERCENT} "
+            "intervals of this mean"
         )
     standing = "snapshot of standing roughness, " if snapshot else ""
     if error.surfaces == 1:
-        return f"{standing}90 % intervals for this surface"
+        return f"{standing}{PERCENT} intervals for this surface"
     return (
-        f"{standing}mean of {error.surfaces} surfaces, 90 % prediction intervals for another "
+        f"{standing}mean of {error.surfaces} surfaces, {PERCENT} prediction intervals for another "
         "surface of this kind"
     )
 
@@ -66,7 +67,7 @@ def _friction_rows(friction: FrictionInterval) -> list[tuple[str, str]]:
     interval = UNDETERMINED if low is None or high is None else entry.interval(low, high)
     cells = friction.numerical
     rows = [
-        ("90 % interval", interval),
+        (f"{PERCENT} interval", interval),
         ("oil under pressure and shear", _sides(entry, friction.oil)),
         ("viscosity of the cold oil", _sides(entry, (friction.heat, 0.0))),
         ("cell size and iteration", UNDETERMINED if cells is None else _sides(entry, (cells,) * 2)),
@@ -79,7 +80,7 @@ def _friction_rows(friction: FrictionInterval) -> list[tuple[str, str]]:
 def _rows(entry: Quantity, error: Uncertainty, whole: ContactError) -> list[tuple[str, str]]:
     unknown = error.low is None or error.high is None
     interval = UNDETERMINED if unknown else entry.interval(error.low or 0.0, error.high or 0.0)
-    rows = [(f"{entry.short}, 90 % interval", interval)]
+    rows = [(f"{entry.short}, {PERCENT} interval", interval)]
     for part, name in PARTS.items():
         sides: Sides | None = getattr(error, part)
         if part == "surfaces" and sides is None:

@@ -7,7 +7,7 @@ sum is the rolling friction. The heat contains the first part only.
 
 The friction of oil is far more uncertain than its film: at contact pressure the viscosity changes
 with the exponential of the pressure-viscosity coefficient, and no data sheet states the stress at
-which an oil yields. `Friction` has both as parts of a 90 % interval.
+which an oil yields. `Friction` has both as parts of an interval.
 """
 
 import math
@@ -21,7 +21,7 @@ from asperity.ehl import ContactSolution
 from asperity.lubricant import EyringShear, NewtonianShear, ShearedFilm, Thermal
 
 BOUNDARY_FRICTION = 0.15  # the paper's Table 2
-# Halves of 90 % intervals:
+# Halves of 90 % intervals, as `core.coverage` states it:
 LAW_ERROR = 0.2  # of ln(eta/eta0) by Roelands' law up to 1 GPa, that of squalane (Bair 2006)
 STRESS_FACTOR = 1.5  # on the stress scale of a friction law; tau0 of mineral oils: 4 to 9 MPa
 TYPICAL_EYRING_STRESS = 5e6  # [Pa] at which oils deviate from Newton's law
@@ -37,7 +37,7 @@ class Friction:
     whole contact, for a line contact over its length; `power` [W] is the heat generated, |shear
     force| times sliding speed. All these are zero in pure rolling.
 
-    `oil_below` and `oil_above` are the 90 % error of the coefficient due to the oil: its
+    `oil_below` and `oil_above` are the error of the coefficient due to the oil: its
     pressure-viscosity coefficient, the law of its viscosity at contact pressure, and the stress
     scale of its friction law. `heat_below` is the friction that the warming of the film would
     take away where the viscosity is that of the cold oil.

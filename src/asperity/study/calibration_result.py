@@ -77,7 +77,7 @@ class Calibration:
     directions : of the free quantities, the best determined first
     trade_offs : the most costly anchor first
     start, fit, check : from `compare_with_anchors`. `check` uses the case's own cells and surfaces
-        not used in the fit; `low` and `high` are 90 % intervals over seeds
+        not used in the fit; `low` and `high` are intervals over seeds
     misfit, start_misfit : sums of squared residuals in tolerances
     evaluations, cases : parameter sets tried, contacts solved or read from the folder
     failed : contacts that failed or did not converge, left out

@@ -92,7 +92,7 @@ class Series(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class TimeMean:
-    """Mean of one number over time and tracks, with parts of its 90 % interval.
+    """Mean of one number over time and tracks, with parts of its interval.
 
     `time` is the half-width due to the finite time and number of tracks, `grid` the difference
     between both grids (None without a coarse one), `deviation` the standard deviation over time.
@@ -386,7 +386,7 @@ def _corrected(coarse: list[Series], blocks: list[Field], change: Field) -> list
 
 
 def _half_widths(parts: list[_Sample]) -> Field:
-    """Return the 90 % half-widths of the sum of the parts' means (Welch and Satterthwaite).
+    """Return the half-widths of the sum of the parts' means (Welch and Satterthwaite).
 
     Infinite if a part has fewer than `MIN_INDEPENDENT` independent passages.
     """

@@ -21,7 +21,7 @@ SAME_WITHIN = (
 class LoadShare:
     """Asperity load share derived from CRF by a model; above 1 where CRF exceeds that at full load.
 
-    `interval` holds the lower and upper ends of the 90 % interval.
+    `interval` holds its lower and upper ends.
     """
 
     clr: Field
@@ -35,7 +35,7 @@ def asperity_load_share(
     *,
     full_load_std_hz: float = 0.0,
 ) -> LoadShare:
-    """Return CLR = (CRF / CRF_full)^6 of a Hertz point contact, with its 90 % interval.
+    """Return CLR = (CRF / CRF_full)^6 of a Hertz point contact, with its interval.
 
     The interval propagates the standard deviations of both frequencies.
 

@@ -1,8 +1,9 @@
 """Stages of wear: a break in the trend of the contact resonance along time or roughness.
 
-They are read from CRF, the damping of its line, or both. A broken stick with a Bayesian break
-competes with smooth curves and with no change: on a smooth curve, a stick alone would report a
-precise but false knee. The module knows no recordings; docs/theory/indicators.md has the equations.
+They are read from CRF, the damping of its line, or both, without a threshold of the load share. A
+broken stick with a Bayesian break competes with smooth curves and with no change: on a smooth
+curve, a stick alone would report a precise but false knee. The module knows no recordings;
+docs/theory/indicators.md has the equations.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from asperity.core.arrays import Field, usual_float_errors
-from asperity.core.coverage import QUANTILES
+from asperity.core.coverage import PERCENT, QUANTILES
 from asperity.core.displayed import Brief
 from asperity.core.errors import BadInput, require_choice
 from asperity.trend.change_points import (
@@ -40,7 +41,7 @@ from asperity.trend.stage_words import (
 
 Detector = Literal["bayesian"]
 
-SEVERE_FROM = 0.5  # probability of lying beyond the break, if there is one
+BEYOND_BREAK_FROM = 0.5  # probability of lying beyond the break, if there is one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,7 +72,7 @@ class Stages(Brief):
         changes. "no distinct stage": a change that a smooth curve explains as well. "no change".
         "disagree": CRF and damping contradict each other, so at least one does not belong to the
         contact. "too few" points
-    split, interval : the break, in units of x, and its 90 % interval; nan unless a stage was found
+    split, interval : the break, in units of x, and its interval; nan unless a stage was found
     probability : shape (recordings,), of being in the severe stage; 0 for running-in and
         steepening, nan where not determined. Weighs the broken stick against smooth curves, so it
         stays below 1 where no stage is distinct
@@ -284,7 +285,7 @@ def _with_stage(
         kind = "severe" if _flattens(courses, outcome.has_break) else "steepening"
     lead, names = _NAMES[kind]
     low, split, high = (axis.x_at(scaled) for scaled in position)
-    where = f"{split:.4g} {axis.unit}".rstrip() + f" (90 % interval {low:.4g} to {high:.4g})"
+    where = f"{split:.4g} {axis.unit}".rstrip() + f" ({PERCENT} interval {low:.4g} to {high:.4g})"
     words = ", ".join(course.words for course in courses)
     after, severe = probabilities
     return Stages(
@@ -293,7 +294,7 @@ def _with_stage(
         split=split,
         interval=(low, high),
         probability=severe,
-        labels=tuple(names[int(p >= SEVERE_FROM)] for p in after),
+        labels=tuple(names[int(p >= BEYOND_BREAK_FROM)] for p in after),
         evidence=outcome.evidence,
         slopes=courses[0].slopes if source != "damping" else (np.nan, np.nan),
         scatter_hz=_scatter(source, outcome),

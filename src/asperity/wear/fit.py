@@ -14,7 +14,7 @@ import numpy as np
 
 from asperity import recording, surface
 from asperity.core.arrays import Field
-from asperity.core.coverage import QUANTILES
+from asperity.core.coverage import PERCENT, QUANTILES
 from asperity.core.documents import JsonObject
 from asperity.core.errors import BadInput, UnreadableFile, require_positive
 from asperity.core.quantities import quantity
@@ -52,7 +52,7 @@ class FrictionTrace:
 
 @dataclass(frozen=True, slots=True)
 class WearEstimate:
-    """Median and its 90 % interval."""
+    """Median and its interval."""
 
     median: float
     low: float
@@ -123,7 +123,7 @@ class WearFit:
         second = quantity("second_volume_m3")
         loss = self.second_volume
         return (
-            f"k is {k.text(self.k.median)} (90 % interval {k.number(self.k.low)} to "
+            f"k is {k.text(self.k.median)} ({PERCENT} interval {k.number(self.k.low)} to "
             f"{k.text(self.k.high)}); predicted loss in a second test of "
             f"{self.second_load:.4g} N over {self.second_distance:.4g} m: "
             f"{second.number(loss.low)} to {second.text(loss.high)}."

@@ -159,7 +159,7 @@ REMOVAL_LAWS: dict[str, type[RemovalLaw]] = {
 
 @dataclass(frozen=True, slots=True)
 class WearCoefficient:
-    """Wear coefficient k [1/Pa], and the ends of its 90 % interval relative to k.
+    """Wear coefficient k [1/Pa], and the ends of its interval relative to k.
 
     Examples
     --------

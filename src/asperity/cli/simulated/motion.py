@@ -22,6 +22,7 @@ from asperity.cli.options import (
 )
 from asperity.cli.output import Block, Row, compilation_text, progress, show, table, text, written
 from asperity.cli.terminal.browser import open_page, require_page
+from asperity.core.coverage import PERCENT
 from asperity.core.errors import AsperityError, BadInput, NotConverged
 from asperity.core.quantities import catalogue, quantity
 
@@ -141,7 +142,7 @@ def _means(values: Mapping[str, object]) -> Iterator[Row]:
         )
         yield entry.title, f"{mean} (start {entry.number(values[f'{entry.key}_start'])})"
         if entry.ends[0] in values:
-            yield f"{entry.short}, 90 % interval by the oil", entry.text_in(values)
+            yield f"{entry.short}, {PERCENT} interval by the oil", entry.text_in(values)
 
 
 def _history_table(moved: "History") -> Block:

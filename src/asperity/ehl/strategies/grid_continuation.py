@@ -338,7 +338,7 @@ def grid_error(
     by_first_order: Figures | None = None,
     order: int = 2,
 ) -> GridError | None:
-    """Return 90 % intervals of the key results from the last grids; None for a single grid.
+    """Return intervals of the key results from the last grids; None for a single grid.
 
     A smooth solution gets Roache's grid convergence index, three times its error: the difference of
     both grids if it is of second `order`, three times that for first order. A rough one has no such
@@ -405,7 +405,7 @@ def _load_share_error(shift: float, change: float, cell: float) -> tuple[float, 
 
 
 def ends_error(on_grids: Sequence[float]) -> float:
-    """Return half the 90 % interval of a value at a roller's ends on successively finer grids.
+    """Return half the interval of a value at a roller's ends on successively finer grids.
 
     See `grid_error`.
     """

@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from asperity.core.coverage import PERCENT
 from asperity.core.quantities import quantity
 from asperity.report.base import Exhibit
 from asperity.report.drawing import display, name_axes, plain_log_labels
@@ -31,7 +32,7 @@ def over_cycle(result: CycleResult) -> Exhibit:
         name_axes(panels[-1], TIME)
         return figure
 
-    bars = " Bars: 90 % intervals." if drawn else ""
+    bars = f" Bars: {PERCENT} intervals." if drawn else ""
     return Exhibit(
         "cycle",
         draw,

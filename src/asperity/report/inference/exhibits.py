@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from asperity.core.arrays import Field
-from asperity.core.coverage import NORMAL_FACTOR, QUANTILES
+from asperity.core.coverage import NORMAL_FACTOR, PERCENT, QUANTILES
 from asperity.core.quantities import quantity
 from asperity.inference import KEY_QUANTITIES, Design, Inference, ObservationPoint
 from asperity.report.base import Exhibit
@@ -133,7 +133,7 @@ def predicted(inference: Inference) -> Exhibit:
         for number, (index, _) in enumerate(observed):
             low, middle, high = np.quantile(predictions[:, index], QUANTILES)
             style: Style = {"linewidth": 7, "alpha": 0.35, "solid_capstyle": "butt"}
-            label = None if number else "predicted, 90 %"
+            label = None if number else f"predicted, {PERCENT}"
             axes.plot([number, number], [low, high], color=BLUE, label=label, **style)
             axes.plot(number, middle, "_", color=BLUE, markersize=12)
         x = np.arange(len(observed))
@@ -149,8 +149,9 @@ def predicted(inference: Inference) -> Exhibit:
     return Exhibit(
         "predicted",
         draw,
-        "CRF observed at each operating point (repeats combined, 90 % interval) and predicted from "
-        "the posterior of all recordings. The model does not explain points outside their bar.",
+        f"CRF observed at each operating point (repeats combined, {PERCENT} interval) and "
+        "predicted from the posterior of all recordings. The model does not explain points outside "
+        "their bar.",
         "Contact resonance frequency at each operating point, observed and predicted",
     )
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import NamedTuple
 
+from asperity.core.coverage import PERCENT
 from asperity.core.quantities import quantity
 from asperity.inference import KEY_QUANTITIES, Design, Forecast, Inference, PointEstimates
 from asperity.report.base import Exhibit, Tile, heading, render, write_page
@@ -118,8 +119,9 @@ def _meaning(inference: Inference, key: str) -> str:
             f"{entry.interval(estimate.low, estimate.high)} is that assumed before."
         )
     return (
-        f"{heading(entry)}: with 90 % probability {entry.interval(estimate.low, estimate.high)}, "
-        f"equally likely above and below {entry.text(estimate.median)}."
+        f"{heading(entry)}: with {PERCENT} probability "
+        f"{entry.interval(estimate.low, estimate.high)}, equally likely above and below "
+        f"{entry.text(estimate.median)}."
     )
 
 

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from asperity.core.arrays import Field
+from asperity.core.coverage import PERCENT
 from asperity.core.quantities import Quantity, quantity
 from asperity.machines import DangVan, MachineResult, Rating
 from asperity.report.base import Exhibit, Numbers
@@ -88,7 +89,7 @@ def _is_by_contact(rating: Rating) -> bool:
 def _bars_note(result: MachineResult) -> str:
     low, high = quantity("clr").ends
     drawn = any(row.get(low) is not None and row.get(high) is not None for row in result.rows)
-    return " Bars: 90 % intervals." if drawn else ""
+    return f" Bars: {PERCENT} intervals." if drawn else ""
 
 
 def _series(result: MachineResult) -> dict[str, list[Numbers]]:

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from asperity.core.arrays import Field
+from asperity.core.coverage import PERCENT
 from asperity.core.quantities import quantity
 from asperity.report.drawing import display, name_axes
 from asperity.report.style import BLUE, GREEN, GREY, ON_PAGE, VERMILION
@@ -75,13 +76,13 @@ def _draw_panel(axes: Axes, curves: Sequence[FrictionCurve], key: str, name: str
 
 
 def _shade_interval(axes: Axes, curve: FrictionCurve, key: str, colour: str) -> None:
-    """Shade the 90 % interval of a quantity that has one."""
+    """Shade the interval of a quantity that has one."""
     points = [point for point in curve.points if point.converged]
     ends = [[getattr(point, end, None) for point in points] for end in quantity(key).ends]
     if all(value is not None for end in ends for value in end):
         x = display(ABSCISSA[curve.kind], _column(points, ABSCISSA[curve.kind]))
         low, high = (np.array(end, float) for end in ends)
-        label = "90 % interval" if colour == STYLES[0][0] else None
+        label = f"{PERCENT} interval" if colour == STYLES[0][0] else None
         axes.fill_between(x, low, high, color=colour, alpha=0.15, linewidth=0.0, label=label)
 
 

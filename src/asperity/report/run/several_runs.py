@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from matplotlib.axes import Axes
 
+from asperity.core.coverage import PERCENT
 from asperity.core.quantities import quantity
 from asperity.report.base import Exhibit, Numbers, capitalised
 from asperity.report.drawing import display, name_axes, one_panel
@@ -31,12 +32,12 @@ def shares_against_roughness(points: Points) -> Exhibit:
 
 
 def resonance_against_roughness(points: Points, full_load_crf_hz: float | None) -> Exhibit:
-    """Draw CRF over Sq with its total 90 % interval."""
+    """Draw CRF over Sq with its total interval."""
     line = quantity("crf_hz")
 
     @one_panel(3.1)
     def draw(axes: Axes) -> None:
-        _draw(axes, points, "crf_hz", "-o", VERMILION, f"{line.short}, 90 % interval")
+        _draw(axes, points, "crf_hz", "-o", VERMILION, f"{line.short}, {PERCENT} interval")
         _draw_intervals(axes, points, "crf_hz", VERMILION)
         if full_load_crf_hz is not None:
             label = "CRF at full load"
@@ -46,8 +47,8 @@ def resonance_against_roughness(points: Points, full_load_crf_hz: float | None) 
     return Exhibit(
         "resonance-against-roughness",
         draw,
-        "Contact resonance frequency with its total 90 % interval, from the record, the grid and, "
-        "if several were solved, the surfaces." + _unconverged_note(points),
+        f"Contact resonance frequency with its total {PERCENT} interval, from the record, the grid "
+        "and, if several were solved, the surfaces." + _unconverged_note(points),
         _values_text(points, "crf_hz"),
     )
 
@@ -66,7 +67,7 @@ def friction_against_roughness(points: Points) -> Exhibit:
     return Exhibit(
         "friction-against-roughness",
         draw,
-        "Friction coefficient with its 90 % interval, and the parts of asperities and oil.",
+        f"Friction coefficient with its {PERCENT} interval, and the parts of asperities and oil.",
         _values_text(points, "friction_coefficient"),
     )
 
@@ -95,7 +96,7 @@ def _draw(axes: Axes, points: Points, key: str, style: str, colour: str, label: 
 
 
 def _draw_intervals(axes: Axes, points: Points, key: str, colour: str) -> None:
-    """Draw the 90 % intervals of a scalar over Sq."""
+    """Draw the intervals of a scalar over Sq."""
     for point in points:
         value, low, high = (point[name] for name in (key, *quantity(key).ends))
         if value is not None and low is not None and high is not None:

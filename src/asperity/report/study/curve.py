@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from asperity.core.arrays import Field
+from asperity.core.coverage import PERCENT
 from asperity.core.quantities import in_print, quantity
 from asperity.paper import (
     PAPER_ANCHORS,
@@ -94,7 +95,9 @@ def first_to_last(key: str, values: Field) -> str:
 def legend_note(study: StudyOverview) -> str:
     """Explain curves, bands and dots of a figure."""
     count = surface_count(study)
-    return f"Means over {count} per level with 90 % intervals of the mean; dots: single surfaces."
+    return (
+        f"Means over {count} per level with {PERCENT} intervals of the mean; dots: single surfaces."
+    )
 
 
 def surface_count(study: StudyOverview) -> str:
@@ -125,7 +128,7 @@ def resonance(study: StudyOverview, curve: WearCurve) -> Exhibit:
         "resonance",
         draw,
         "Contact resonance frequency (CRF) and amplitude (CRFA) of the same contacts"
-        f"{BOTH if len(presets) > 1 else ''}. Shaded: 90 % interval of the "
+        f"{BOTH if len(presets) > 1 else ''}. Shaded: {PERCENT} interval of the "
         f"split. {legend_note(study)} {stages}",
         f"CRF and CRFA over Sq. {stages}",
     )
@@ -312,7 +315,7 @@ def _mark_stages(axes: Axes, curve: WearCurve, preset: str, *, named: bool) -> N
     stages = curve.stages[preset]
     low, high = display("sq_m", curve.sq[[0, -1]])
     names: dict[str, float] = {stages.kind: 0.5 * (low + high)}
-    mark_split(axes, stages, "split, 90 %")
+    mark_split(axes, stages, f"split, {PERCENT}")
     if stages.found:
         before, after = stage_names(stages)
         names = {before: 0.5 * (low + stages.split), after: 0.5 * (stages.split + high)}
@@ -336,7 +339,7 @@ def legend_of_panels(figure: Figure, *panels: Axes, columns: int, seeds: bool = 
     for axes in panels:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             keys.setdefault(label, handle)
-    keys["90 % interval of the mean"] = Patch(color=GREY, alpha=0.3, linewidth=0)
+    keys[f"{PERCENT} interval of the mean"] = Patch(color=GREY, alpha=0.3, linewidth=0)
     if seeds:
         keys["single seeds"] = Line2D(
             [], [], color=GREY, marker=".", linestyle="none", alpha=0.6, markersize=4

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from asperity.core.coverage import PERCENT
 from asperity.core.files import make_folder, require_writable, write_csv
 from asperity.core.quantities import quantity
 from asperity.paper import Anchor
@@ -151,7 +152,7 @@ def _tiles(study: StudyOverview) -> list[Tile]:
             continue
         low, high = (split.number(end) for end in stages.interval)
         value, detail = (
-            (split.text(stages.split), f"90 %: {low} to {high}")
+            (split.text(stages.split), f"{PERCENT}: {low} to {high}")
             if stages.found
             else ("none", stages.kind)
         )

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
 
 from asperity.core.arrays import Field
-from asperity.core.coverage import COVERAGE
+from asperity.core.coverage import COVERAGE, PERCENT
 from asperity.core.quantities import quantity
 from asperity.report.base import Exhibit
 from asperity.report.drawing import (
@@ -72,8 +72,8 @@ def output_curves(study: StudyOverview, axis: SweptAxis) -> Exhibit:
     return Exhibit(
         f"against-{_file_name(axis)}",
         draw,
-        f"Outputs over {axis.key}: cases as dots, and {means}{others}, with 90 % intervals of the "
-        "mean.",
+        f"Outputs over {axis.key}: cases as dots, and {means}{others}, with {PERCENT} intervals of "
+        "the mean.",
         f"Outputs of the study over {axis.key}.",
     )
 

@@ -9,7 +9,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from asperity.core.arrays import Field
-from asperity.core.coverage import NORMAL_FACTOR
+from asperity.core.coverage import NORMAL_FACTOR, PERCENT
 from asperity.core.errors import BadInput
 from asperity.core.quantities import column_label, in_print, quantity
 from asperity.monitoring import BASELINE, Track, TrackedRecording
@@ -65,22 +65,22 @@ def trend(track: Track) -> Exhibit:
     return Exhibit(
         "trend",
         draw,
-        f"{quantity('crf_hz').short} of each recording with its 90 % interval; blue: normal, "
+        f"{quantity('crf_hz').short} of each recording with its {PERCENT} interval; blue: normal, "
         "orange: severe. "
-        + ("Shaded: 90 % interval of the break. " if split else "")
+        + (f"Shaded: {PERCENT} interval of the break. " if split else "")
         + "Below: probability of the severe stage.",
         f"Trend of the contact resonance over {x_label(track)}: {track.verdict()}",
     )
 
 
 def _draw_crf(axes: Axes, track: Track, resonant: list[TrackedRecording]) -> None:
-    mark_split(axes, track.stages, "break, 90 %")
+    mark_split(axes, track.stages, f"break, {PERCENT}")
     x, x_std = np.array([(recording.x, recording.x_std) for recording in resonant]).T
     crf, crf_std = np.array(
         [(recording.resonance.crf_hz, recording.resonance.crf_std) for recording in resonant]
     ).T
     x_bars: Style = {"xerr": NORMAL_FACTOR * x_std} if x_std.any() else {}
-    style: Style = {"ecolor": GREY, "zorder": 1, "label": "90 % interval"}
+    style: Style = {"ecolor": GREY, "zorder": 1, "label": f"{PERCENT} interval"}
     draw_intervals(axes, x, crf, NORMAL_FACTOR * crf_std, "none", **x_bars, **style)
     colours = SEVERITY(np.nan_to_num([recording.severe_probability for recording in resonant]))
     label = quantity("crf_hz").short
@@ -129,7 +129,7 @@ def _draw_severity(axes: Axes, track: Track) -> None:
 
 
 def amplitude(track: Track) -> Exhibit:
-    """Draw CRFA over x with 90 % intervals."""
+    """Draw CRFA over x with intervals."""
 
     @one_panel(3.1)
     def draw(axes: Axes) -> None:
@@ -147,7 +147,7 @@ def amplitude(track: Track) -> Exhibit:
         )
         bars = [crfa - crfa / factor, crfa * factor - crfa]
         x = [recording.x for recording in resonant]
-        label = f"{quantity('crfa').short} with 90 % interval"
+        label = f"{quantity('crfa').short} with {PERCENT} interval"
         _draw_trend(axes, track, x, (crfa, bars), marker="s", color=BLUE, label=label)
         axes.set(yscale="log", ylabel=crfa_label(track), title="Contact resonance amplitude")
 
@@ -160,7 +160,7 @@ def amplitude(track: Track) -> Exhibit:
 
 
 def damping(track: Track) -> Exhibit:
-    """Draw the damping ratio over x with 90 % intervals and its own break."""
+    """Draw the damping ratio over x with intervals and its own break."""
     stages = track.stages_by.get("damping")
 
     @one_panel(3.1)
@@ -176,7 +176,7 @@ def damping(track: Track) -> Exhibit:
         style: Style = {
             "marker": "^",
             "color": GREEN,
-            "label": "damping ratio with 90 % interval",
+            "label": f"damping ratio with {PERCENT} interval",
         }
         _draw_trend(axes, track, x, (ratio, bars), stages, **style)
         unknown = [
@@ -264,7 +264,7 @@ def _relative_levels(track: Track) -> dict[str, Field]:
 
 
 def asperity_load_share(track: Track) -> Exhibit:
-    """Draw CLR from the CRF over x with 90 % intervals."""
+    """Draw CLR from the CRF over x with intervals."""
 
     @one_panel(3.1)
     def draw(axes: Axes) -> None:
@@ -303,7 +303,7 @@ def _draw_trend(
     **style: Any,
 ) -> None:
     """Draw values with intervals and the break of `stages` (default: the deciding one)."""
-    mark_split(axes, stages or track.stages, "break, 90 %")
+    mark_split(axes, stages or track.stages, f"break, {PERCENT}")
     values, bars = values_and_bars
     draw_intervals(axes, x, values, bars, marker, ecolor=GREY, markersize=4, **style)
     axes.set_xlabel(x_label(track))

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from asperity.core.coverage import PERCENT
 from asperity.core.quantities import NO_VALUE, in_print, quantity
 from asperity.monitoring import FORECAST, Reading, Track, TrackedRecording
 from asperity.report.base import Exhibit, Picture, Tile, capitalised, render, write_page
@@ -222,7 +223,7 @@ def _tiles(track: Track) -> list[Tile]:
     if stages is not None and stages.found:
         low, high = stages.interval
         label = f"Break at, {exhibits.x_label(track)}"
-        tiles.append(Tile(label, f"{stages.split:.3g}", f"90 %: {low:.3g} to {high:.3g}"))
+        tiles.append(Tile(label, f"{stages.split:.3g}", f"{PERCENT}: {low:.3g} to {high:.3g}"))
     last = next(
         (recording for recording in reversed(track.recordings) if recording.resonance.found), None
     )
@@ -249,7 +250,7 @@ def _resonance_tiles(recording: TrackedRecording) -> Iterator[Tile]:
         yield Tile("Severe, last recording", probability, "probability")
     if np.isfinite(recording.clr):
         low, high = recording.clr_interval
-        interval = f"90 %: {clr.number(low)} to {clr.number(high)}"
+        interval = f"{PERCENT}: {clr.number(low)} to {clr.number(high)}"
         yield Tile("Asperity load share, last", clr.text(recording.clr), interval)
 
 

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 
 from asperity.core.arrays import Field
+from asperity.core.coverage import PERCENT
 from asperity.core.quantities import quantity
 from asperity.paper import CRF_ENDS_HZ, SAMPLES_SQ_UM
 from asperity.report.base import Exhibit
@@ -82,8 +83,8 @@ def curves(history: WearHistory) -> Exhibit:
     return Exhibit(
         "over-hours",
         draw,
-        "One point per wear step. Band of CLR: 90 % interval of the mean over the positions of a "
-        f"step, without the error due to the cells.{_k_note(history)}",
+        f"One point per wear step. Band of CLR: {PERCENT} interval of the mean over the positions "
+        f"of a step, without the error due to the cells.{_k_note(history)}",
         "Roughness parameters, load and area shares, film, friction, flash temperature, wear depth "
         "and CRFA over hours",
     )
@@ -105,7 +106,7 @@ def headline(history: WearHistory) -> Exhibit:
     return Exhibit(
         "load-share",
         draw,
-        "Load carried by asperities over the hours. Band: 90 % interval of the mean over the "
+        f"Load carried by asperities over the hours. Band: {PERCENT} interval of the mean over the "
         f"positions of a step, without the error due to the cells.{_k_note(history)}",
         f"Asperity load share over hours, from {share.text(first)} to {share.text(last)}.",
     )
@@ -158,7 +159,11 @@ def resonance(history: WearHistory, *, papers: bool) -> Exhibit:
         stages = history.stages
         if stages is not None and stages.found:
             left.axvspan(
-                *stages.interval, color=GREY, alpha=0.2, linewidth=0, label="stage break, 90 %"
+                *stages.interval,
+                color=GREY,
+                alpha=0.2,
+                linewidth=0,
+                label=f"stage break, {PERCENT}",
             )
             left.axvline(stages.split, color=GREY)
         if papers:
@@ -200,9 +205,13 @@ def _draw_crf(axes: Axes, x: Field, key: str, history: WearHistory) -> None:
         )
     )
     style: Style = {"color": BLUE, "linewidth": 0}
-    axes.fill_between(x, mean_low, mean_high, alpha=0.3, label="mean over positions, 90 %", **style)
+    axes.fill_between(
+        x, mean_low, mean_high, alpha=0.3, label=f"mean over positions, {PERCENT}", **style
+    )
     if np.isfinite(low).any():
-        axes.fill_between(x, low, high, alpha=0.1, label="with scatter and grid, 90 %", **style)
+        axes.fill_between(
+            x, low, high, alpha=0.1, label=f"with scatter and grid, {PERCENT}", **style
+        )
     axes.plot(x, crf, color=BLUE, label="this contact")
     axes.set(xlabel=quantity(key).axis, ylabel=quantity("crf_hz").label)
 

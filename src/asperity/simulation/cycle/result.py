@@ -22,7 +22,7 @@ FINE = 2000  # intervals of an integral over a cycle
 class CycleInstant:
     """Rough contact at an instant: means over tracks and a short time, SI.
 
-    `half_widths` are those of the 90 % intervals by key, None where not determined: of the scatter
+    `half_widths` are those of the intervals by key, None where not determined: of the scatter
     between the tracks and, if `grid` is known, the difference to a grid of half as many cells.
     `friction_sides` are the errors of the friction coefficient by the oil, below and above. A
     `reason` states why there are no numbers.
@@ -36,7 +36,7 @@ class CycleInstant:
     reason: str = ""
 
     def interval(self, key: str) -> tuple[float | None, float | None]:
-        """Return the 90 % interval of a number; (None, None) where not determined."""
+        """Return the interval of a number; (None, None) where not determined."""
         value, half = self.numbers.get(key), self.half_widths.get(key)
         if value is None or half is None:
             return None, None
@@ -49,7 +49,7 @@ class CycleInstant:
 
 @dataclass(frozen=True, kw_only=True)
 class CycleTotal:
-    """Integral over a cycle with its 90 % interval; None where not determined."""
+    """Integral over a cycle with its interval; None where not determined."""
 
     value: float | None
     low: float | None = None
@@ -104,7 +104,7 @@ class CycleResult(Displayed):
         return float(self.film.times[index]), float(self.film.h_min[index])
 
     def film_interval(self, name: str, time: float) -> tuple[float | None, float | None]:
-        """Return the 90 % interval of a film at a time [s] by cells and time steps [m]."""
+        """Return the interval of a film at a time [s] by cells and time steps [m]."""
         if self.coarse is None:
             return None, None
         value, other = (

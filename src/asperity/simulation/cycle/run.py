@@ -337,7 +337,7 @@ def _combined(
 
 
 def _half_width(values: list[float]) -> float:
-    """Return the 90 % half-width of a mean; infinite for a single value."""
+    """Return the half-width of a mean; infinite for a single value."""
     count = len(values)
     if count < 2:
         return math.inf

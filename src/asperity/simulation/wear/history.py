@@ -13,7 +13,7 @@ import scipy
 
 from asperity.case import Case
 from asperity.core.arrays import finite_or_none
-from asperity.core.coverage import UPPER
+from asperity.core.coverage import PERCENT, UPPER
 from asperity.core.displayed import Displayed
 from asperity.core.documents import JsonObject
 from asperity.core.errors import BadInput
@@ -43,7 +43,7 @@ class _Slope(NamedTuple):
 
 
 class WearDrift(NamedTuple):
-    """Rate of change of a quantity per hour, and its 90 % interval."""
+    """Rate of change of a quantity per hour, and its interval."""
 
     per_hour: float
     low: float
@@ -153,7 +153,7 @@ class WearHistory(Displayed):
 
     @property
     def k_interval(self) -> tuple[float, float] | None:
-        """Ends of k's 90 % interval relative to k, if wear scales with k times time; else None.
+        """Ends of k's interval relative to k, if wear scales with k times time; else None.
 
         With removal only, and the same interval for both bodies, a different k only stretches time.
         """
@@ -198,7 +198,7 @@ class WearHistory(Displayed):
         return [Moment(float(time), self.state(float(time))) for time in times]
 
     def interval_by_k(self, key: str) -> "pandas.DataFrame | None":
-        """Return a quantity's 90 % interval by k over time: columns `hours`, `low`, `high`.
+        """Return a quantity's interval by k over time: columns `hours`, `low`, `high`.
 
         The interval is the range of the quantity between the ends of the interval of k times the
         time; nan where the history would have to be longer. None where wear does not scale with k
@@ -257,7 +257,7 @@ class WearHistory(Displayed):
         return WearDrift(base.slope, min(limits), max(limits))
 
     def _slope(self, key: str, since: float, until: float) -> "_Slope | None":
-        """Return slope and half its 90 % interval by linear regression; None with too few rows."""
+        """Return slope and half its interval by linear regression; None with too few rows."""
         rows = self.table[self.table["hours"].between(since, until) & self.table[key].notna()]
         if len(rows) < MIN_ROWS:
             return None
@@ -267,7 +267,7 @@ class WearHistory(Displayed):
         )
 
     def volume_interval(self, body: int) -> tuple[float, float] | None:
-        """Return the 90 % interval of a body's worn volume [m^3], by k.
+        """Return the interval of a body's worn volume [m^3], by k.
 
         It is extrapolated beyond the end at the last rate: too high where wear slows down.
         """
@@ -361,7 +361,7 @@ class WearHistory(Displayed):
         if self.row_at(-1)["clr_low"] is not None:
             return ""
         known = "clr_low" in self.printed_row(-1)
-        return "; 90 % intervals " + (
+        return f"; {PERCENT} intervals " + (
             "of the mean over positions" if known else "are not determined"
         )
 
@@ -390,8 +390,8 @@ class WearHistory(Displayed):
         notes = [*self.remarks, *self.case.notes]
         if self.row_at(-1)["clr_low"] is None:
             notes.append(
-                "The 90 % intervals of CLR and CRF for a further position, which include the error "
-                "due to the cells, are not determined."
+                f"The {PERCENT} intervals of CLR and CRF for a further position, which include the "
+                "error due to the cells, are not determined."
             )
         if model.overrolling is None:
             rates = " and ".join(f"{rate:.4g}" for rate in contact.overrolling)

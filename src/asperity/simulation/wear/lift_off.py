@@ -38,7 +38,7 @@ Progress = Callable[[float, SpeedShare], None]  # with the speed [m/s] and its l
 
 
 class SpeedRatio(NamedTuple):
-    """Lift-off speed after wear over that before, with its 90 % interval."""
+    """Lift-off speed after wear over that before, with its interval."""
 
     value: float
     low: float

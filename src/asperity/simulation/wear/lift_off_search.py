@@ -20,7 +20,7 @@ LIFT_OFF_CLR = 0.01  # load share of the asperities that defines lift-off
 
 
 class SpeedShare(NamedTuple):
-    """Mean load share of the asperities at a speed, and the half-width of its 90 % interval."""
+    """Mean load share of the asperities at a speed, and the half-width of its interval."""
 
     clr: float
     half_width: float
@@ -51,7 +51,7 @@ class SearchSettings:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class LiftOff(Brief):
-    """Lift-off speed [m/s] with its 90 % interval; None with a `reason` if it is not determined.
+    """Lift-off speed [m/s] with its interval; None with a `reason` if it is not determined.
 
     `below` and `above` are the widths of the interval in ln(speed), by the finite time and the
     remaining bracket. `shares` are the load shares by speed.

@@ -1,4 +1,4 @@
-"""Columns of the wear history: roughness of both bodies, wear, contact; time is in `run`."""
+"""Columns of the wear history: roughness of both bodies, and contact; time and wear: `run._row`."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -104,7 +104,7 @@ def load_share(solved: Sequence[SolvedPosition]) -> Uncertainty:
 
 
 def contact_row(case: Case, solved: Sequence[SolvedPosition], sq: float) -> Row:
-    """Return the mean contact with 90 % intervals of load share and resonance: total and mean.
+    """Return the mean contact with intervals of load share and resonance: total and mean.
 
     `sq` [m] is that of the tracks without the form that wear created.
     """
