@@ -42,6 +42,16 @@ def in_this_process(monkeypatch):
 
 
 @pytest.fixture
+def short_tracks(monkeypatch):
+    """Solve running roughness over 4 passages of the Hertz zone instead of 6, in this process.
+
+    For tests of what is done with running contacts; those of their numbers use the whole tracks.
+    """
+    for module in ("results.running", "transient.running"):
+        monkeypatch.setattr(f"asperity.{module}.PASSAGES", 4)
+
+
+@pytest.fixture
 def coarse_search(monkeypatch):
     """Search for lines on half as many blocks, in a quarter of the time.
 

@@ -15,6 +15,13 @@ from support.emulated import CASE, SMALL
 PAPER = (Path(__file__).parents[2] / "examples" / "paper.toml").read_text("utf-8")
 
 
+@pytest.fixture(autouse=True)
+def _without_workers(request):
+    """Start worker processes only in tests marked `workers`, which compare both ways."""
+    if request.node.get_closest_marker("workers") is None:
+        request.getfixturevalue("in_this_process")
+
+
 @pytest.fixture
 def asp(tmp_path, monkeypatch, capsys):
     """Return a function that runs a command beside a small case: exit code, stdout and stderr."""

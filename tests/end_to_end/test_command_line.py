@@ -273,7 +273,9 @@ def test_a_dry_smooth_contact_is_hertzian_and_has_all_load_on_asperities(asp):
     assert dry["crf_hz"] is None  # no roughness passes: no excitation
 
 
+@pytest.mark.workers
 def test_python_and_command_line_agree(asp):
+    """In this process, and with its further tracks in workers."""
     run = solve_case(load_case("case.toml"))
     assert {k: v for k, v in run.summary().items() if k != "seconds"} == numbers(
         asp("solve", "case.toml", "--json")[1]

@@ -73,7 +73,7 @@ QUICK = ("--workers", "1", "--set", "grid.cells=[48, 24]")
 
 
 @pytest.fixture
-def asp(tmp_path, monkeypatch, capsys, in_this_process):  # noqa: ARG001 - commands are small
+def asp(tmp_path, monkeypatch, capsys):
     """Return a function that runs a command beside the examples: exit code, stdout and stderr."""
     monkeypatch.chdir(tmp_path)
     for name in ("fzg-c", "nu206", "6206"):

@@ -23,8 +23,8 @@ RUN = (
 )  # other languages cannot be run: cases and output
 REASON = re.compile(r"<!-- not run: (\S.*\S) -->")
 SUCCESS = {0, 3, 4, 5}  # exit codes of a command that did its work
-# pages that show numbers of a running contact; those of others are solved on fewer cells, and the
-# cases of `new` as they are by test_starters
+# pages that show numbers of a running contact; those of others are solved on fewer cells and over
+# fewer passages, and the cases of `new` as they are by test_starters
 SHOW_NUMBERS = {"first-hour.md"}
 SHOWN = re.compile(r"(--[\w-]+|\S+\.\w+)")
 
@@ -44,13 +44,13 @@ def with_snippets() -> list[Page]:
     return [page for page in pages() if snippets(page) and page.path.name != "README.md"]
 
 
-@pytest.mark.usefixtures("in_this_process")
 @pytest.mark.parametrize(
     "page", with_snippets(), ids=lambda page: page.path.relative_to(ROOT).as_posix()
 )
-def test_the_snippets_of_a_page_run(page, tmp_path, monkeypatch, capsys):
+def test_the_snippets_of_a_page_run(page, tmp_path, monkeypatch, capsys, request):
     monkeypatch.chdir(tmp_path)
     if page.path.name not in SHOW_NUMBERS:
+        request.getfixturevalue("short_tracks")
         for name in ("MOST_RUNNING_CELLS", "MANY_RUNNING_CELLS"):
             monkeypatch.setattr(f"asperity.case.case.{name}", 400)
     shutil.copytree(ROOT / "examples", "examples")

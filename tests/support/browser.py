@@ -88,11 +88,11 @@ class Server:
 def write_small_contact(folder: Path, *, sliding: bool = False) -> str:
     """Write the default case on few cells; return its name.
 
-    Without sliding, the page computes no Stribeck curve.
+    Without sliding, its roughness stands still and the page computes no Stribeck curve.
     """
     few = {"grid.cells": [96, 64], "solver.running_cells": 600}
     if not sliding:
-        few["contact.slip"] = 0.0
+        few |= {"contact.slip": 0.0, "contact.roughness": "standing"}
     (folder / "contact.toml").write_text(default_case().with_overrides(few).text, "utf-8")
     return "contact.toml"
 

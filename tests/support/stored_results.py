@@ -2,13 +2,21 @@
 solves the presets and writes their results into the package.
 """
 
+import io
 import json
 import sys
 import time
+from dataclasses import fields
+from importlib.metadata import version
+from pathlib import Path
+from zipfile import ZIP_DEFLATED, ZipFile
+
+import numpy as np
 
 from asperity.app import presets
 from asperity.app.contact_result import ContactResult, result_of_run
 from asperity.app.settings import Settings
+from asperity.case import Case
 from asperity.results import solve_case
 from support.source import PACKAGE
 
@@ -23,12 +31,40 @@ def solved(name: str) -> ContactResult:
     return result_of_run(run, time.perf_counter() - start)
 
 
+def store_result(case: Case, result: ContactResult, path: Path) -> str:
+    """Write the result of a case to a file; return the digest of the case."""
+    skipped = {*presets.FIELDS, "spectrum", "sound", "sound_rate_hz"}
+    values = {
+        part.name: getattr(result, part.name) for part in fields(result) if part.name not in skipped
+    }
+    spectrum, curves = result.spectrum, {}
+    values["spectrum"] = None
+    if spectrum is not None:
+        curves = {
+            f"spectrum_{key}": getattr(spectrum, key).astype(np.float32) for key in presets.CURVES
+        }
+        values["spectrum"] = {
+            part.name: getattr(spectrum, part.name)
+            for part in fields(spectrum)
+            if part.name not in presets.CURVES
+        }
+    values["version"] = version("asperity")
+    arrays = {key: getattr(result, key) for key in presets.FIELDS} | curves
+    arrays["values"] = np.array(json.dumps(values, default=float))
+    with ZipFile(path, "w", ZIP_DEFLATED, compresslevel=9) as file:
+        for name, values in arrays.items():
+            buffer = io.BytesIO()
+            np.save(buffer, values, allow_pickle=False)
+            file.writestr(f"{name}.npy", buffer.getvalue())
+    return presets.case_digest(case)
+
+
 def store(name: str) -> None:
     """Solve a preset and write its result."""
     case, result = Settings(presets.preset_case(name)).case, solved(name)
     assert result.converged, f"{name}: {result.explained}"
     file = f"{name}.npz"
-    digest = presets.store_result(case, result, FOLDER / file)
+    digest = store_result(case, result, FOLDER / file)
     table = json.loads(DIGESTS.read_text("utf-8"))
     table = {key: other for key, other in table.items() if other != file} | {digest: file}
     ordered = dict(sorted(table.items(), key=lambda entry: entry[1]))

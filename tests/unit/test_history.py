@@ -55,7 +55,7 @@ def test_a_shift_by_whole_cells_moves_the_heights():
 
 def test_the_second_surface_moves_at_its_own_speed_and_is_mirrored():
     composite = CompositeSurface(rough(seed=1), rough(seed=2), (4.0, 2.0))
-    surfaces = MovingSurfaces.from_composite(composite)
+    surfaces = MovingSurfaces(composite.first, composite.second, composite.speeds, GRID)
     np.testing.assert_allclose(surfaces.composite_at(0.0).heights, composite.surface.heights)
     moved = (
         np.roll(composite.first.heights, 4, axis=0)

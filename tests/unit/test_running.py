@@ -14,7 +14,7 @@ from asperity.case import case_template, load_case
 from asperity.contact.grid import Grid
 from asperity.core.errors import BadInput, NotConverged
 from asperity.ehl import half_as_many, least_film, running_cells, solve_contact
-from asperity.results import load_run, running_surfaces, solve_case
+from asperity.results import load_run, running_surfaces, solve_case, uncertainty_rows
 from asperity.results.running import _moments
 from asperity.solution import contact_state
 from asperity.surface import MovingSurfaces, Surface, flat_surface
@@ -233,6 +233,17 @@ def test_the_scatter_of_slow_roughness_is_not_determined():
     assert math.isfinite(time_means([series(values)], [1], series(values))["clr"].time)
     slow = series(values, zones=0.25)
     assert time_means([slow], [1], slow)["clr"].time == math.inf
+
+
+@pytest.mark.usefixtures("short_tracks")
+def test_a_track_too_short_for_its_scatter_leaves_friction_undetermined(monkeypatch):
+    """On the report too, whose table of uncertainty failed."""
+    monkeypatch.setattr("asperity.transient.running.MIN_INDEPENDENT", 100.0)
+    run = solve_case(load_case(PAPER).with_overrides({**RUNNING, "solver.running_cells": 400}))
+    assert run.running.numbers["friction_error"] is None
+    assert (run.friction_interval.low, run.friction_interval.high) == (None, None)
+    rows = dict(uncertainty_rows(run.error, run.friction_interval))
+    assert rows["µ, 90 % interval"] == "not determined"
 
 
 def test_repeated_tracks_scatter_by_their_means():

@@ -193,11 +193,6 @@ class CaseInput:
         return str(self.written)
 
     @property
-    def identifier(self) -> str:
-        """HTML name of the key."""
-        return self.key.replace(".", "-").replace("_", "-")
-
-    @property
     def choices(self) -> tuple[str, ...]:
         """Options of a choice; empty for a number."""
         if self.key != "grid.cells":

@@ -1,15 +1,13 @@
 """Preset cases of the page, and stored results that it shows until the solver is ready.
 
-A stored result was computed by the solver for exactly the text of its case; `store_result` writes
-it, and a digest of the case identifies it.
+A stored result was computed by the solver for exactly the text of its case, whose digest
+identifies it; `support.stored_results` of the tests writes it.
 """
 
 import io
 import json
-from dataclasses import fields
 from functools import cache
 from hashlib import sha256
-from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
 from typing import NamedTuple
@@ -89,28 +87,6 @@ def stored_result(case: Case) -> StoredResult | None:
         values |= {key: _tuples(values[key]) for key in ("extent", "half_widths", "notes")}
         maps = {key: stored[key] for key in FIELDS}
     return StoredResult(ContactResult(**maps, **values, spectrum=spectrum), maker)
-
-
-def store_result(case: Case, result: ContactResult, path: Path) -> str:
-    """Write the result of a case to a file; return the digest of the case."""
-    skipped = {*FIELDS, "spectrum", "sound", "sound_rate_hz"}
-    values: Numbers = {
-        part.name: getattr(result, part.name) for part in fields(result) if part.name not in skipped
-    }
-    spectrum, curves = result.spectrum, Numbers()
-    values["spectrum"] = None
-    if spectrum is not None:
-        curves = {f"spectrum_{key}": getattr(spectrum, key).astype(np.float32) for key in CURVES}
-        values["spectrum"] = {
-            part.name: getattr(spectrum, part.name)
-            for part in fields(spectrum)
-            if part.name not in CURVES
-        }
-    values["version"] = version("asperity")
-    maps = {key: getattr(result, key) for key in FIELDS}
-    text = json.dumps(values, default=float)
-    np.savez_compressed(path, values=np.array(text), **maps, **curves)
-    return case_digest(case)
 
 
 def _tuples(values: object) -> object:

@@ -194,6 +194,7 @@ class RatioDamping(DampingLaw):
     """Constant damping ratio, C = 2 ζ ω m: the paper's Eq 5."""
 
     name = "ratio"
+    divisor: ClassVar[float] = 1.0
 
     def __call__(
         self,
@@ -203,8 +204,8 @@ class RatioDamping(DampingLaw):
         damping_ratio: float,
         solution: ContactSolution | None = None,  # noqa: ARG002
     ) -> float:
-        """Return ζ as stated."""
-        return damping_ratio
+        """Return ζ as stated, or as the law changes it."""
+        return damping_ratio / self.divisor
 
     def summary(self, damping_ratio: float) -> str:
         """Return the damping ratio as text."""
@@ -236,21 +237,12 @@ class ConstantDamping(Parametric, DampingLaw):
 
 
 @dataclass(frozen=True, slots=True)
-class HertzForRadian(DampingLaw):
+class HertzForRadian(RatioDamping):
     """The paper's Eq 5 with the frequency of Eq 4 in Hz, not rad/s: a damping ratio of ζ/2π."""
 
     name = "hertz-for-radian"
-
-    def __call__(
-        self,
-        *,
-        mass: float,  # noqa: ARG002
-        stiffness: float,  # noqa: ARG002
-        damping_ratio: float,
-        solution: ContactSolution | None = None,  # noqa: ARG002
-    ) -> float:
-        """Return ζ/2π."""
-        return damping_ratio / (2.0 * float(np.pi))
+    divisor: ClassVar[float] = 2.0 * float(np.pi)
+    summary = DampingLaw.summary
 
 
 @dataclass(frozen=True, slots=True)

@@ -195,12 +195,6 @@ class TaperedRollerBearing:
         """Distance of the middle of a contact line from the apex [m]: D/(2 sin ν)."""
         return self.roller_diameter / (2.0 * math.sin(self.taper_half_angle))
 
-    @property
-    def end_diameters(self) -> tuple[float, float]:
-        """Diameters of a roller at its small and its large end [m]."""
-        half = self.roller_length / (2.0 * self.apex_distance)
-        return self.roller_diameter * (1.0 - half), self.roller_diameter * (1.0 + half)
-
     @cached_property
     def kinematics(self) -> RollingKinematics:
         """Speeds and frequencies at mid-roller, with γ = D cos β/d_m.

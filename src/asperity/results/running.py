@@ -276,8 +276,8 @@ def _running(case: Case, track_series: list[Series], fine: Series) -> Running:
 
 
 def _error(mean: TimeMean) -> float | None:
-    """Return the error of a mean by cells and finite time; None without a coarse grid."""
-    return None if mean.grid is None else math.hypot(mean.grid, mean.time)
+    """Return the error of a mean by cells and finite time; None if a part is not determined."""
+    return None if mean.grid is None or math.isinf(mean.time) else math.hypot(mean.grid, mean.time)
 
 
 def _moments(fine: Series, cut: int) -> list[Snapshot]:

@@ -55,8 +55,8 @@ class WearCurve(Brief):
             raise BadInput(
                 f"the study has no column {quantity!r}; it has {', '.join(self.table.columns)}"
             )
-        rows = self.table[(self.table["status"] == DONE) & (self.table[SQ_KEY] == self.sq[level])]
-        values = rows[quantity].to_numpy(dtype=float)
+        valid = (self.table["status"] == DONE) & (self.table[SQ_KEY] == self.sq[level])
+        values = self.table.loc[valid, quantity].to_numpy(dtype=float)
         return np.asarray(values[np.isfinite(values)])
 
     def by_case(self, quantity: str) -> tuple[Field, Field]:

@@ -10,7 +10,7 @@ import json
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,13 @@ import pyarrow
 from asperity.case import load_case, relative_path, to_si
 from asperity.core.arrays import Field
 from asperity.core.errors import AsperityError, BadInput, UnreadableFile
-from asperity.core.files import make_folder, require_writable, versions, write_bytes
+from asperity.core.files import (
+    make_folder,
+    require_file,
+    require_writable,
+    versions,
+    write_bytes,
+)
 from asperity.core.storage import (
     MANIFEST,
     read_manifest,
@@ -50,6 +56,10 @@ class StudyFolder:
     folder: Path
     plan: StudyPlan
     design: str  # as stored; may differ from the plan's if written by another version of asperity
+    # parts by path, time and size: each is read in a subprocess
+    _read: dict[tuple[Path, int, int], pyarrow.Table] = field(
+        default_factory=dict, repr=False, compare=False
+    )
 
     def finished(self) -> dict[str, tuple[str, int]]:
         """Return status and attempt of every stored case."""
@@ -135,7 +145,13 @@ class StudyFolder:
         return sorted((self.folder / PARTS).glob("*.parquet"))
 
     def _read_part(self, path: Path) -> pyarrow.Table:
-        return read_table(path, self.design, "delete it; its cases are then computed again")
+        require_file(path)
+        state = path.stat()
+        key = (path, state.st_mtime_ns, state.st_size)
+        if key not in self._read:
+            remedy = "delete it; its cases are then computed again"
+            self._read[key] = read_table(path, self.design, remedy)
+        return self._read[key]
 
     def _write(self, path: Path, table: pyarrow.Table) -> None:
         try:

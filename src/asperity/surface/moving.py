@@ -17,7 +17,6 @@ from asperity.contact.grid import Grid
 from asperity.core.arrays import Field
 from asperity.core.errors import BadInput
 from asperity.surface.model import Surface, flat_surface
-from asperity.surface.prepare import CompositeSurface
 
 ComplexField: TypeAlias = npt.NDArray[np.complex128]
 
@@ -57,11 +56,6 @@ class MovingSurfaces:
                     f"{track.cells} cells of {track.spacing[0]:.4g} m for {self.grid.cells} of "
                     f"{self.grid.spacing[0]:.4g} m; make it on the contact's grid"
                 )
-
-    @classmethod
-    def from_composite(cls, composite: CompositeSurface) -> "MovingSurfaces":
-        """Make moving surfaces of a composite one, whose grid becomes the track."""
-        return cls(composite.first, composite.second, composite.speeds, composite.first.grid)
 
     @classmethod
     def one_rough(
