@@ -24,7 +24,7 @@ def first_call() -> tuple[float, bool]:
             capture_output=True,
             text=True,
         )
-        return perf_counter() - began, "compiles" in done.stderr
+        return perf_counter() - began, "compiling" in done.stderr
 
 
 def lines(*, fast: bool) -> Iterator[str]:  # noqa: ARG001 - there is only one first call

@@ -36,7 +36,7 @@ from asperity.inference import (
     infer_observations,
     inference_setting,
 )
-from asperity.inference.inference import STAGES, stage_probabilities
+from asperity.inference.inference import REGIMES, stage_probabilities
 from asperity.inference.recording_input import resonance_band
 from asperity.paper import Disturbance
 from asperity.paper.rig_recording import GRID_HZ, RigTest, contact_line, draw_background
@@ -335,7 +335,7 @@ def coverage(found: Inference, at: tuple[float, float], machine: Machine) -> dic
             ends |= {f"{key}_{name}low": float(low), f"{key}_{name}high": float(high)}
     own = found.point_estimates()[place - 1]
     true_stage = max(stage_probabilities(np.array([clr])).items(), key=lambda entry: entry[1])[0]
-    ordered = sorted(STAGES, key=lambda stage: -own.stages[stage])
+    ordered = sorted(REGIMES, key=lambda stage: -own.stages[stage])
     reached = np.cumsum([own.stages[stage] for stage in ordered])
     needed = ordered[: int(np.searchsorted(reached, 0.9)) + 1]
     return {

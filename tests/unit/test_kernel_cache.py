@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from asperity.kernels import compiled
+from asperity.core.processes import cores
+from asperity.kernels import ahead, compiled
 
 KERNEL = """
 from asperity.kernels.compiled import njit
@@ -92,3 +93,57 @@ def test_concurrent_writers_never_mix_their_code(tmp_path):
     second.save("int64", "code of integers")
     save_data(*delayed[0])
     assert compiled._CheckedFile(str(tmp_path), "late", stamp).load("int64") is None
+
+
+OF_A_CONTACT = """
+from numba import typeof
+from numba.core.dispatcher import Dispatcher
+used, compiled = set(), Dispatcher.compile
+
+def record(kernel, types):
+    used.add((kernel.py_func.__name__, str(types)))
+    return compiled(kernel, types)
+
+Dispatcher.compile = record
+from asperity.app.contact_jobs import warm_up
+from asperity.kernels.ahead import calls
+warm_up()
+ahead = {
+    (kernel.py_func.__name__, str(tuple(map(typeof, arguments)))) for kernel, arguments in calls()
+}
+own = {name for name, _ in ahead}
+print(sorted(ahead - used), sorted(call for call in used - ahead if call[0] in own))
+"""
+
+
+def test_kernels_compiled_ahead_are_those_of_a_rough_contact():
+    process = subprocess.run(
+        [sys.executable, "-c", OF_A_CONTACT], capture_output=True, text=True, check=True
+    )
+    assert process.stdout.strip() == "[] []"
+
+
+def test_nothing_is_compiled_ahead_where_kernels_are_compiled():
+    ahead.compile_ahead(lambda *_: pytest.fail("a kernel was compiled"))
+
+
+AHEAD = """
+from asperity.kernels import ahead
+names = ("mark_sealed", "fill_oil_rows", "fix_film_gap")
+every = [call for call in ahead.calls() if call[0].py_func.__name__ in names]
+ahead.calls = lambda: every
+done = []
+ahead.compile_ahead(lambda *counts: done.append(counts))
+print(done, [len(kernel.signatures) for kernel, _ in every])
+"""
+
+
+@pytest.mark.skipif(cores() < 2, reason="kernels are compiled ahead on two processors")
+def test_two_processes_compile_the_kernels_of_an_empty_cache(tmp_path):
+    """The other process goes through the whole list, from its end."""
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    process = subprocess.run(
+        [sys.executable, "-c", AHEAD], capture_output=True, text=True, check=True, env=environment
+    )
+    assert process.stdout.strip() == "[(0, 3), (1, 3), (2, 3)] [1, 1, 1]"
+    assert len([*tmp_path.rglob("*.nbi")]) >= 3

@@ -7,6 +7,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
+from functools import partial
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Protocol
@@ -182,9 +183,19 @@ def progress(
 ) -> Iterator[Display]:
     """Show progress on a terminal, otherwise (with `log`) as lines at growing intervals.
 
-    With `compiles`, a notice after a delay states that no iteration is completed yet; it names the
-    compilation at the first solve after installation.
+    With `compiles`, the solver is compiled at the first solve after installation, and a notice
+    after a delay states that no iteration is completed yet.
     """
+    with _shown(label, doing, quiet=quiet, compiles=compiles, log=log) as display:
+        if compiles and compilation_text():
+            from asperity.kernels.ahead import compile_ahead
+
+            compile_ahead(partial(display, "compiling the solver, once after installation ..."))
+        yield display
+
+
+@contextmanager
+def _shown(label: str, doing: str, *, quiet: bool, compiles: bool, log: bool) -> Iterator[Display]:
     terminal = sys.stderr.isatty()
     if quiet or not (terminal or log):
         yield _unseen

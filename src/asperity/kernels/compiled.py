@@ -127,3 +127,13 @@ def njit(*, cache: bool, **options: Any) -> Callable[[Kernel], Kernel]:
         return typed
 
     return compiled
+
+
+def is_cached(kernel: Any) -> bool:
+    """Return True if compiled code of a kernel is stored for other processes."""
+    return isinstance(kernel._cache, _Cache)
+
+
+def is_compiled(kernel: Any) -> bool:
+    """Return True if a process has stored compiled code of a kernel, of this version or not."""
+    return Path(kernel._cache._cache_file._index_path).exists()
