@@ -18,14 +18,7 @@ from asperity.core.quantities import catalogue
 from support.judging import AMOUNT, block_problems, link_resolves, location, problems, span_error
 from support.pages import Line, Page, pages, read
 from support.source import PACKAGE, ROOT, functions, modules, parsed
-from support.vocabulary import (
-    case_sections,
-    commands,
-    golden,
-    json_keys,
-    json_texts,
-    toml,
-)
+from support.vocabulary import case_sections, commands, golden, json_keys, json_texts, toml
 
 EXCEPTIONS = {  # valid spans of no known kind
     "CLR 0.786, CAR 0.098, CRF 3684 Hz": "printed, see test_readme",

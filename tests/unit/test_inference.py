@@ -29,11 +29,7 @@ from asperity.inference import (
     with_observation,
 )
 from asperity.inference import emulator as emulator_module
-from asperity.inference.estimates import (
-    information_gain,
-    quantity_estimate,
-    quantity_estimates,
-)
+from asperity.inference.estimates import information_gain, quantity_estimate, quantity_estimates
 from asperity.inference.gaussian_process import GaussianProcess, fit_process
 from asperity.inference.likelihood import (
     COMMON_SHARE,

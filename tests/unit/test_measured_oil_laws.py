@@ -5,14 +5,7 @@ import pytest
 
 from asperity.case import load_case
 from asperity.core.errors import BadInput
-from asperity.lubricant import (
-    Carreau,
-    CarreauShear,
-    Doolittle,
-    ShearedFilm,
-    Tait,
-    Yasutomi,
-)
+from asperity.lubricant import Carreau, CarreauShear, Doolittle, ShearedFilm, Tait, Yasutomi
 from asperity.results import load_run, solve_case
 from asperity.solution import regime_card
 

@@ -13,12 +13,7 @@ from asperity.ehl import Options, film_loss, flooded_reach, least_film, solve_co
 from asperity.ehl.far_pressure import ELASTIC_SHARE
 from asperity.lubricant import Barus, DowsonHigginson, Lubricant, Newtonian, Roelands
 from asperity.results import solve_case
-from asperity.solution import (
-    inlet_notes,
-    plausibility_notes,
-    solution_notes,
-    uncertain_films,
-)
+from asperity.solution import inlet_notes, plausibility_notes, solution_notes, uncertain_films
 from asperity.solution.plausibility import ridge_radii
 from asperity.surface import Surface, flat_surface, gaussian_surface, ground_surface
 from support.paper import barus, contact, grid, rough

@@ -1,28 +1,28 @@
-"""Progress output: shown on terminals only; announces compilation until the solver iterates."""
+"""Progress output: shown on terminals only; names the compilation of the solver."""
 
 import os
 import subprocess
 import sys
 from time import sleep
 
-import pytest
-
 from asperity.cli import output
 from asperity.ehl import Iteration
 
 
-@pytest.mark.parametrize(("number", "announced"), [(0, True), (1, False)])
-def test_the_compilation_message_ends_with_the_first_iteration(
-    monkeypatch, capsys, tmp_path, number, announced
-):
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr(output, "NOTICE_DELAY_S", 0.05)
+def test_compilation_is_shown_before_the_first_iteration(monkeypatch, capsys):
+    monkeypatch.setattr(output, "FIRST_LINE_S", 0.05)
+
+    def compile_ahead(report):
+        report(3, 28)
+        sleep(0.1)
+
+    monkeypatch.setattr("asperity.kernels.ahead.compile_ahead", compile_ahead)
     with output.solver_progress("case", quiet=False) as step:
-        step(Iteration((8, 8), number, 1.0, 1.0, float("inf")))
-        sleep(0.3)
-    assert ("compiles the solver" in capsys.readouterr().err) is announced
-    (tmp_path / "kernel.nbi").touch()  # an earlier solve has compiled
-    assert output.compilation_text() == ""
+        first = capsys.readouterr().err
+        step(Iteration((8, 8), 1, 1.0, 1.0, float("inf")))
+        sleep(0.15)
+    assert first == "case: compiling the solver, once after installation ... (0 s so far)\n"
+    assert "compiling" not in capsys.readouterr().err
 
 
 def test_units_are_printed_with_the_micro_sign(capsys):

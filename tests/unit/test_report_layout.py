@@ -9,13 +9,7 @@ from test_report import run_like
 
 from asperity.report import base, write_report
 from asperity.report.run import page
-from asperity.report.style import (
-    ACROSS_PAGE,
-    CONTACT_COLOUR,
-    FILM_COLOURS,
-    IN_COLUMN,
-    OIL_COLOUR,
-)
+from asperity.report.style import ACROSS_PAGE, CONTACT_COLOUR, FILM_COLOURS, IN_COLUMN, OIL_COLOUR
 from support.browser import chromium
 
 SCREENS = {1280: (800, 1), 390: (844, 2)}  # width: height of a screen, screens to the first picture

@@ -14,13 +14,7 @@ import xarray
 
 from asperity.cli import main
 from asperity.core.errors import UnreadableFile
-from asperity.core.storage import (
-    append_digest,
-    read_netcdf,
-    read_table,
-    unpack_arrays,
-    write_table,
-)
+from asperity.core.storage import append_digest, read_netcdf, read_table, unpack_arrays, write_table
 from asperity.paper import papers_case
 from asperity.results import solve_case
 from asperity.solution import load_solution

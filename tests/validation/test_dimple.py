@@ -10,12 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from asperity.benchmark import (
-    DimpleExperiment,
-    ExperimentResult,
-    compute_dimples,
-    load_experiments,
-)
+from asperity.benchmark import DimpleExperiment, ExperimentResult, compute_dimples, load_experiments
 from asperity.core.errors import BadInput
 
 (MOURIER,) = [entry for entry in load_experiments() if isinstance(entry, DimpleExperiment)]

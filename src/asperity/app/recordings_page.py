@@ -4,13 +4,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from bokeh.models import (
-    ColumnDataSource,
-    HoverTool,
-    Select,
-    Span,
-    TextInput,
-)
+from bokeh.models import ColumnDataSource, HoverTool, Select, Span, TextInput
 from markupsafe import Markup
 
 from asperity.app.contact_jobs import JobFailure

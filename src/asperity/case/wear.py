@@ -10,14 +10,7 @@ from asperity.case.messages import Section, quoted
 from asperity.case.units import OPTIONAL, PAIRED, Count, amount_in, parse_amount, plain
 from asperity.contact.conditions import ContactConditions
 from asperity.core.errors import BadInput
-from asperity.wear import (
-    MECHANISMS,
-    REMOVAL_LAWS,
-    SCATTER,
-    SEVERITIES,
-    WearCoefficient,
-    WearModel,
-)
+from asperity.wear import MECHANISMS, REMOVAL_LAWS, SCATTER, SEVERITIES, WearCoefficient, WearModel
 
 Made = TypeVar("Made")
 

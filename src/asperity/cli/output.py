@@ -1,12 +1,11 @@
 """Output of commands: a verdict with tables and notes, or one JSON object; and progress."""
 
 import json
-import os
 import re
 import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from time import monotonic
@@ -22,7 +21,6 @@ if TYPE_CHECKING:
     from asperity.ehl import Iteration
 
 FIRST_LINE_S, MAX_LINE_DELAY_S = 5.0, 600.0  # between lines of progress without a terminal
-NOTICE_DELAY_S = 2.0  # without a solver step, after which compilation is announced
 
 # the u of a unit, except in a quoted value
 MICRO = re.compile(r"(?:(?<=\d )|(?<=per ))u(?=[ms]\b(?![\"']))")
@@ -139,23 +137,12 @@ class Display(Protocol):
         """Update the display."""
 
 
-def compilation_text() -> str:
-    """Return a clause on the compilation at the first solve; empty where its result is stored."""
-    folder = Path(os.environ.get("NUMBA_CACHE_DIR") or Path(__file__).parents[1] / "kernels")
-    if next(folder.rglob("*.nbi"), None) is not None:  # index of a compiled kernel
-        return ""
-    return "; the first solve after installation compiles the solver, up to a minute"
-
-
 @contextmanager
-def _log(label: str, doing: str, notice: str | None) -> Iterator[Display]:
-    """Show progress as lines of a log, with a notice unless an iteration is completed soon."""
+def _log(label: str, doing: str) -> Iterator[Display]:
+    """Show progress as lines of a log."""
     start_s = monotonic()
     ended = threading.Event()
     state = doing or "working ..."
-    announcement = threading.Timer(
-        NOTICE_DELAY_S, print, [notice], {"file": sys.stderr, "flush": True}
-    )
 
     def print_lines() -> None:
         delay_s = FIRST_LINE_S
@@ -164,15 +151,13 @@ def _log(label: str, doing: str, notice: str | None) -> Iterator[Display]:
             print(f"{label}: {state} ({elapsed})", file=sys.stderr, flush=True)
             delay_s = min(2.0 * delay_s, MAX_LINE_DELAY_S)
 
-    def take(doing: str) -> None:
+    def take(doing: str, *_: object, **__: object) -> None:
         nonlocal state
         state = doing
-        announcement.cancel()
 
     threading.Thread(target=print_lines, daemon=True).start()
     try:
-        with nullcontext() if notice is None else _announced(announcement):
-            yield lambda doing, *_, **__: take(doing)
+        yield take
     finally:
         ended.set()
 
@@ -183,11 +168,10 @@ def progress(
 ) -> Iterator[Display]:
     """Show progress on a terminal, otherwise (with `log`) as lines at growing intervals.
 
-    With `compiles`, the solver is compiled at the first solve after installation, and a notice
-    after a delay states that no iteration is completed yet.
+    With `compiles`, the solver is compiled first, if it is the first solve after installation.
     """
-    with _shown(label, doing, quiet=quiet, compiles=compiles, log=log) as display:
-        if compiles and compilation_text():
+    with _shown(label, doing, quiet=quiet, log=log) as display:
+        if compiles:
             from asperity.kernels.ahead import compile_ahead
 
             compile_ahead(partial(display, "compiling the solver, once after installation ..."))
@@ -195,24 +179,20 @@ def progress(
 
 
 @contextmanager
-def _shown(label: str, doing: str, *, quiet: bool, compiles: bool, log: bool) -> Iterator[Display]:
+def _shown(label: str, doing: str, *, quiet: bool, log: bool) -> Iterator[Display]:
     terminal = sys.stderr.isatty()
     if quiet or not (terminal or log):
         yield _unseen
         return
     label = printable(label)
-    notice = f"{label}: no iteration yet{compilation_text()} ..."
     if not terminal:
-        with _log(label, doing, notice if compiles else None) as display:
+        with _log(label, doing) as display:
             yield display
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     console = Console(stderr=True)
-    announcement = threading.Timer(
-        NOTICE_DELAY_S, console.print, [notice], {"soft_wrap": True, "highlight": False}
-    )
     label_column, doing_column = (
         TextColumn(f"{{task.{name}}}", markup=False) for name in ("description", "fields[doing]")
     )
@@ -223,25 +203,13 @@ def _shown(label: str, doing: str, *, quiet: bool, compiles: bool, log: bool) ->
         disable=not console.is_terminal,  # such as with TERM=dumb
         redirect_stdout=sys.stdout.isatty(),  # output to a file must not be captured
     )
-    with _announced(announcement) if compiles else nullcontext(), bar:
+    with bar:
         task = bar.add_task(label, total=None, doing=doing)
 
         def show_progress(doing: str, done: int | None = None, total: int | None = None) -> None:
-            announcement.cancel()
             bar.update(task, doing=doing, completed=done, total=total)
 
         yield show_progress
-
-
-@contextmanager
-def _announced(announcement: threading.Timer) -> Iterator[None]:
-    """Run the announcement unless it is cancelled or the work ends."""
-    announcement.daemon = True
-    announcement.start()
-    try:
-        yield
-    finally:
-        announcement.cancel()
 
 
 def _unseen(doing: str, done: int | None = None, total: int | None = None) -> None:

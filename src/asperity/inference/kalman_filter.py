@@ -8,13 +8,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from asperity.core.arrays import Field
-from asperity.inference.likelihood import (
-    EXPONENT_STD,
-    GAIN_STD,
-    SIZES,
-    WEIGHTS,
-    law_correlations,
-)
+from asperity.inference.likelihood import EXPONENT_STD, GAIN_STD, SIZES, WEIGHTS, law_correlations
 from asperity.inference.visits import CHANNELS, SeriesMeasurement
 
 KNOTS = 17  # of the table along the range of the drifting unknown

@@ -6,7 +6,8 @@ against an attacker with write access to the folder.
 
 A kernel inlines the kernels that it calls and the constants of their modules, so it is stale when
 any module of the folder has changed. numba numbers its data files, and two processes may use one
-number for two signatures: every entry therefore stores its source stamp and its key.
+number for two signatures: every entry therefore stores its source stamp and its key. The cache is
+next to the package, in the user's cache, or in the folder NUMBA_CACHE_DIR.
 """
 
 import pickle
@@ -129,11 +130,12 @@ def njit(*, cache: bool, **options: Any) -> Callable[[Kernel], Kernel]:
     return compiled
 
 
-def is_cached(kernel: Any) -> bool:
+def is_cached(kernel: object) -> bool:
     """Return True if compiled code of a kernel is stored for other processes."""
-    return isinstance(kernel._cache, _Cache)
+    return isinstance(getattr(kernel, "_cache", None), _Cache)
 
 
-def is_compiled(kernel: Any) -> bool:
-    """Return True if a process has stored compiled code of a kernel, of this version or not."""
-    return Path(kernel._cache._cache_file._index_path).exists()
+def is_compiled(kernel: object) -> bool:
+    """Return True if a process has stored compiled code of a kernel in this version."""
+    cache = getattr(kernel, "_cache", None)
+    return isinstance(cache, _Cache) and bool(cache._cache_file._load_index())

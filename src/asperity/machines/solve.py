@@ -24,14 +24,7 @@ from asperity.machine import MachineContact
 from asperity.machines.result import MachineResult, condition_row
 from asperity.results import Run, load_run, solve_case
 from asperity.solution import heats_inlet
-from asperity.study import (
-    DONE,
-    StudyPlan,
-    StudyProgress,
-    StudyResult,
-    plan_points,
-    run_study,
-)
+from asperity.study import DONE, StudyPlan, StudyProgress, StudyResult, plan_points, run_study
 
 ALL_CELLS = 1_000_000  # of all automatic grids together: about two minutes on two processors
 FEWEST_CELLS = 48  # along an axis

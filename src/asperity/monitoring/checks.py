@@ -11,12 +11,7 @@ from asperity.core.errors import BadInput
 from asperity.monitoring.auxiliary_channels import fault_rates, read_auxiliary
 from asperity.monitoring.files import recordings_in
 from asperity.monitoring.reading import channels_in
-from asperity.monitoring.suitability import (
-    USES,
-    Suitability,
-    good_for,
-    suitabilities,
-)
+from asperity.monitoring.suitability import USES, Suitability, good_for, suitabilities
 from asperity.monitoring.target import Target, search_target
 from asperity.recording import (
     OpenRecording,

@@ -113,8 +113,7 @@ def post(url: str, content: bytes, headers: Mapping[str, str]) -> None:
 
     Raises NotificationFailed for a status other than 200 to 299, OSError without an answer.
     """
-    from urllib.error import HTTPError
-    from urllib.request import HTTPRedirectHandler, Request, build_opener
+    from urllib.request import HTTPError, HTTPRedirectHandler, Request, build_opener
 
     class NoRedirect(HTTPRedirectHandler):
         def redirect_request(self, *_: object) -> None:

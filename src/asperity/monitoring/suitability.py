@@ -8,11 +8,7 @@ from dataclasses import dataclass
 
 from asperity.monitoring.reading import line_spacing
 from asperity.monitoring.target import Target
-from asperity.rating import (
-    HIGHEST_HZ,
-    LOWEST_HZ,
-    MAX_SPACING_HZ,
-)
+from asperity.rating import HIGHEST_HZ, LOWEST_HZ, MAX_SPACING_HZ
 from asperity.recording import OpenRecording, Quality, SampleStatistics
 from asperity.vibration import Envelope
 

@@ -7,24 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from asperity.core.errors import BadInput
-from asperity.recording.model import (
-    ACCELERATION,
-    FULL_SCALE,
-    UNKNOWN,
-    Channel,
-    Fact,
-)
+from asperity.recording.model import ACCELERATION, FULL_SCALE, UNKNOWN, Channel, Fact
 from asperity.recording.sensitivity import (
     EXAMPLE,
     ChargeOutput,
     SensorSensitivity,
     parse_sensitivity,
 )
-from asperity.recording.units import (
-    acceleration_scale,
-    velocity_scale,
-    voltage_scale,
-)
+from asperity.recording.units import acceleration_scale, velocity_scale, voltage_scale
 
 _SAME_SENSITIVITY = 1e-3  # relative difference of sensitivities that agree
 

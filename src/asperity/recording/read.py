@@ -28,14 +28,7 @@ from asperity.recording import (
     wav,
 )
 from asperity.recording.conversion import convert
-from asperity.recording.model import (
-    Channel,
-    Contents,
-    Fact,
-    OpenRecording,
-    ReadOptions,
-    Recording,
-)
+from asperity.recording.model import Channel, Contents, Fact, OpenRecording, ReadOptions, Recording
 from asperity.recording.reader import MOST_CHANNELS, REMEDY, parse_time
 from asperity.recording.sidecar import MACHINE_KEYS, OPERATING_KEYS, read_sidecar
 from asperity.recording.text_header import looks_like_text

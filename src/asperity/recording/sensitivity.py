@@ -8,11 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from asperity.core.errors import BadInput
-from asperity.recording.units import (
-    acceleration_scale,
-    velocity_scale,
-    voltage_scale,
-)
+from asperity.recording.units import acceleration_scale, velocity_scale, voltage_scale
 
 EXAMPLE = "100 mV/g"
 _NAMED = re.compile(r"(?i)sensitivity|empfindlichkeit|sensibilit|übertragungsfaktor")

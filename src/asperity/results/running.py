@@ -30,11 +30,7 @@ from asperity.ehl import (
 from asperity.results.derived import Derived
 from asperity.results.determined import Determined
 from asperity.results.surface_spread import Row, Scalar, crf_error
-from asperity.solution import (
-    Friction,
-    friction,
-    inlet_viscosity_factor,
-)
+from asperity.solution import Friction, friction, inlet_viscosity_factor
 from asperity.surface import MovingSurfaces
 from asperity.transient import (
     PASSAGES,

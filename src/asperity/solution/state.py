@@ -5,13 +5,7 @@ import numpy as np
 from asperity.contact.conditions import ContactConditions
 from asperity.contact.grid import Grid
 from asperity.core.arrays import Field, Mask, usual_float_errors
-from asperity.ehl import (
-    ContactError,
-    ContactSolution,
-    ContactState,
-    Scales,
-    Uncertainty,
-)
+from asperity.ehl import ContactError, ContactSolution, ContactState, Scales, Uncertainty
 from asperity.ehl.load_shares import CENTRE, area_share, carried_share
 from asperity.ehl.models.mixed import MixedBalance, evaluate
 from asperity.ehl.models.single_pressure import Balance

@@ -41,12 +41,7 @@ from asperity.study.evaluate import (
 from asperity.study.maps import require_zarr
 from asperity.study.plan import StudyCase, StudyPlan
 from asperity.study.result import StudyResult
-from asperity.study.store import (
-    StudyFolder,
-    open_study_folder,
-    ordered_table,
-    rows_table,
-)
+from asperity.study.store import StudyFolder, open_study_folder, ordered_table, rows_table
 
 BATCH_S = 2.0  # work in a batch: long against the cost of submitting it, short enough to lose
 LARGEST_BATCH = 200

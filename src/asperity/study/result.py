@@ -62,15 +62,7 @@ class StudyResult(Displayed):
         return self._store(case_id).maps(case_id)
 
     def run(self, case_id: str) -> Run:
-        """Load the stored run of a case; see `fields` of `run_study`.
-
-        Raises
-        ------
-        UnreadableFile
-            if no run is stored or it is damaged.
-        BadInput
-            for a case of another study, or a study in memory.
-        """
+        """Load the stored run of a case; `fields` and errors as for `maps`."""
         return self._store(case_id).run(case_id)
 
     def _store(self, case_id: str) -> StudyFolder:

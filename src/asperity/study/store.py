@@ -22,13 +22,7 @@ import pyarrow
 from asperity.case import load_case, relative_path, to_si
 from asperity.core.arrays import Field
 from asperity.core.errors import AsperityError, BadInput, UnreadableFile
-from asperity.core.files import (
-    make_folder,
-    require_file,
-    require_writable,
-    versions,
-    write_bytes,
-)
+from asperity.core.files import make_folder, require_file, require_writable, versions, write_bytes
 from asperity.core.storage import (
     MANIFEST,
     read_manifest,

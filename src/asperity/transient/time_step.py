@@ -16,14 +16,7 @@ import numpy as np
 
 from asperity.contact.conditions import ContactConditions
 from asperity.core.arrays import Field
-from asperity.ehl import (
-    ContactSolution,
-    ContactState,
-    Oil,
-    Options,
-    Scales,
-    solve_contact,
-)
+from asperity.ehl import ContactSolution, ContactState, Oil, Options, Scales, solve_contact
 from asperity.ehl.models.mixed import MixedBalance, Pressures, evaluate
 from asperity.ehl.models.single_pressure import Balance, Problem
 from asperity.ehl.models.transient_term import TransientTerm

@@ -24,9 +24,7 @@ from asperity.trend.alarm_inputs import (
 from asperity.trend.decision import Decision, Judge, assess
 from asperity.trend.level_monitors import LevelJudgement, LevelMonitors
 from asperity.trend.regressors import BASELINE_RECORDINGS, Condition
-from asperity.trend.sequential import (
-    BASELINE_POINTS,
-)
+from asperity.trend.sequential import BASELINE_POINTS
 
 ALARM_STATES: tuple[AlarmState, ...] = get_args(AlarmState)
 FALSE_ALARM_RATE = 1e-3  # per recording

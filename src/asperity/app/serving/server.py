@@ -25,12 +25,7 @@ from asperity.app import study_page as study
 from asperity.app.jobs import VisitPool, WorkerPool
 from asperity.app.opening import OpenedPage
 from asperity.app.recording_jobs import RecordingContext
-from asperity.app.serving.access import (
-    LOCALHOST,
-    MAX_BODY,
-    AccessPolicy,
-    password_for,
-)
+from asperity.app.serving.access import LOCALHOST, MAX_BODY, AccessPolicy, password_for
 from asperity.app.serving.session_cleanup import CLEANUP_MS, SessionSweeper, freeze_objects
 from asperity.app.settings import Settings
 from asperity.app.surface_store import SurfaceStore

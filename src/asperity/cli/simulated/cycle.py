@@ -20,17 +20,7 @@ from asperity.cli.options import (
     chosen_case,
     read_overrides,
 )
-from asperity.cli.output import (
-    Block,
-    Row,
-    columns,
-    compilation_text,
-    named_path,
-    progress,
-    show,
-    table,
-    written,
-)
+from asperity.cli.output import Block, Row, columns, named_path, progress, show, table, written
 from asperity.cli.terminal.browser import open_page, require_page
 from asperity.core.errors import AsperityError
 from asperity.core.quantities import quantity
@@ -128,7 +118,7 @@ def _require_solved(result: "CycleResult") -> None:
 @contextmanager
 def _shown(label: str, *, quiet: bool) -> "Iterator[Callable[[CycleProgress], None]]":
     """Show the progress of film and rough contacts."""
-    with progress(label, f"the film{compilation_text()} ...", quiet=quiet) as display:
+    with progress(label, "the film ...", quiet=quiet, compiles=True) as display:
 
         def step(state: "CycleProgress") -> None:
             if state.solved == 0:

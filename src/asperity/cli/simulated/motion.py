@@ -20,7 +20,7 @@ from asperity.cli.options import (
     SurfaceFile,
     chosen_case,
 )
-from asperity.cli.output import Block, Row, compilation_text, progress, show, table, text, written
+from asperity.cli.output import Block, Row, progress, show, table, text, written
 from asperity.cli.terminal.browser import open_page, require_page
 from asperity.core.coverage import PERCENT
 from asperity.core.errors import AsperityError, BadInput, NotConverged
@@ -117,7 +117,7 @@ def run(
 def _steps_shown(label: str, *, quiet: bool) -> "Iterator[Callable[[HistoryProgress], None]]":
     """Show completed steps and the load share on a terminal."""
     clr = quantity("clr")
-    with progress(label, f"the start{compilation_text()} ...", quiet=quiet) as display:
+    with progress(label, "the start ...", quiet=quiet, compiles=True) as display:
 
         def step(state: "HistoryProgress") -> None:
             share = f"{clr.short} {clr.text(state.row['clr'])}"

@@ -23,16 +23,7 @@ from asperity.cli.options import (
     Workers,
     chosen_case,
 )
-from asperity.cli.output import (
-    Block,
-    columns,
-    compilation_text,
-    progress,
-    show,
-    span,
-    table,
-    written,
-)
+from asperity.cli.output import Block, columns, progress, show, span, table, written
 from asperity.cli.terminal.browser import open_page, require_page
 from asperity.core.errors import BadInput
 from asperity.core.processes import cores
@@ -193,7 +184,7 @@ def _show(
 def _simulate(
     chosen: "Case", label: str, hours: float, out: Path | None, workers: int, *, quiet: bool
 ) -> "WearHistory":
-    with progress(label, f"the start{compilation_text()} ...", quiet=quiet) as display:
+    with progress(label, "the start ...", quiet=quiet, compiles=True) as display:
 
         def jump(state: "WearProgress") -> None:
             row = state.row

@@ -50,15 +50,7 @@ from asperity.ehl.models.single_pressure import (
 )
 from asperity.kernels import load_sharing
 from asperity.kernels.load_sharing import FREE, CellState, ContactBounds
-from asperity.kernels.reynolds import (
-    CAPPED,
-    LUBRICATED,
-    RUPTURED,
-    TOUCHING,
-    Faces,
-    Film,
-    Rows,
-)
+from asperity.kernels.reynolds import CAPPED, LUBRICATED, RUPTURED, TOUCHING, Faces, Film, Rows
 
 
 class Pressures(NamedTuple):

@@ -12,12 +12,7 @@ from asperity.core.errors import BadInput
 from asperity.monitoring.auxiliary_channels import UNITS
 from asperity.monitoring.overalls.formats import unit_of_rows
 from asperity.monitoring.overalls.number_text import ColumnNumbers, column_numbers
-from asperity.recording import (
-    OPERATING_KEYS,
-    acceleration_scale,
-    name_and_unit,
-    velocity_scale,
-)
+from asperity.recording import OPERATING_KEYS, acceleration_scale, name_and_unit, velocity_scale
 
 FEWEST_NUMBERS = 8  # of a column, as of a baseline; all rows of a shorter table
 FEWEST_CODES = 4  # distinct whole numbers up to which a column called quality holds codes

@@ -2,12 +2,7 @@
 
 import json
 
-from asperity.monitoring.series_state import (
-    SeriesMemory,
-    StoredLevels,
-    pack_shared,
-    unpack_shared,
-)
+from asperity.monitoring.series_state import SeriesMemory, StoredLevels, pack_shared, unpack_shared
 from asperity.monitoring.store.database import Store
 from asperity.monitoring.store.schema import Run
 from asperity.monitoring.track_result import Track

@@ -22,12 +22,7 @@ from asperity.monitoring.store.database import (
     Store,
     StoredRecording,
 )
-from asperity.monitoring.store.memories import (
-    read_levels,
-    read_memory,
-    write_levels,
-    write_memory,
-)
+from asperity.monitoring.store.memories import read_levels, read_memory, write_levels, write_memory
 from asperity.monitoring.store.notification_queue import (
     NotificationQueue,
     PendingNotification,

@@ -26,13 +26,7 @@ from asperity.report.drawing import (
 from asperity.report.study.curve import limit_to_data
 from asperity.report.study.quantity_names import axis_label, value_label
 from asperity.report.style import BLUE, GREY, Medium, Style
-from asperity.study import (
-    GROUPS,
-    StudyOverview,
-    SweptAxis,
-    group_means,
-    pair_means,
-)
+from asperity.study import GROUPS, StudyOverview, SweptAxis, group_means, pair_means
 
 MAX_VECTOR_DOTS = 1500  # more dots are rasterised
 MAX_LABELLED_CELLS = 8  # per side of a map; a larger map has no numbers in its cells

@@ -27,12 +27,7 @@ from asperity.simulation.cycle.film import (
     merged,
     steady_films,
 )
-from asperity.simulation.cycle.instants import (
-    InstantJob,
-    InstantRow,
-    case_at,
-    solve_instant,
-)
+from asperity.simulation.cycle.instants import InstantJob, InstantRow, case_at, solve_instant
 from asperity.simulation.cycle.result import CycleInstant, CycleResult
 from asperity.solution import friction, heats_inlet
 from asperity.transient import Snapshot
