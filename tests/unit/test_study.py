@@ -438,6 +438,12 @@ def test_invalid_settings_are_refused(plan, tmp_path, settings, sentence):
         run_study(plan, out=tmp_path, **settings)
 
 
+def test_fields_that_a_kind_does_not_have_are_refused(case, tmp_path):
+    vibrating = plan_study(case.with_overrides({"study.kind": "vibrate"}))
+    with pytest.raises(BadInput, match="kind 'vibrate' has no field gap; leave it out"):
+        run_study(vibrating, out=tmp_path, fields=["gap"])
+
+
 def test_a_folder_without_a_study_is_refused(tmp_path):
     with pytest.raises(UnreadableFile, match="holds no study"):
         load_study(tmp_path)

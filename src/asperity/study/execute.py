@@ -46,6 +46,7 @@ from asperity.study.store import StudyFolder, open_study_folder, ordered_table, 
 BATCH_S = 2.0  # work in a batch: long against the cost of submitting it, short enough to lose
 LARGEST_BATCH = 200
 BATCHES_AHEAD = 2  # per worker; more would only be lost in a crash
+STORED_FIELDS = {"solve": FIELDS, "shake": FIELDS, "surfaces": (RUN,)}  # by kind of study
 MAX_CRASHES = 3  # of the processes that computed one case, the last of them running it alone
 
 
@@ -105,7 +106,7 @@ def run_study(
     _require_shard(shard)
     if workers is not None:
         require_positive("workers", workers)
-    _require_fields(fields, stored=out is not None)
+    _require_fields(fields, plan.kind, stored=out is not None)
     start = time.perf_counter()
     progress = progress or notebook_progress("Study", _progress_text)
     with nullcontext() if out is None else open_study_folder(Path(out), plan, shard) as store:
@@ -164,10 +165,13 @@ def study_executor(workers: int | None = None) -> Iterator[Executor]:
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _require_fields(fields: Sequence[str], *, stored: bool) -> None:
+def _require_fields(fields: Sequence[str], kind: str, *, stored: bool) -> None:
     unknown = [name for name in fields if name not in FIELDS]
     if unknown:
         raise BadInput(f"fields must be among {', '.join(FIELDS)}, got {unknown[0]}")
+    absent = [name for name in fields if name not in STORED_FIELDS.get(kind, ())]
+    if absent:
+        raise BadInput(f"a study of kind {kind!r} has no field {absent[0]}; leave it out")
     if fields and not stored:
         raise BadInput("fields need a folder to be stored in; give out")
     if any(name != RUN for name in fields):
