@@ -50,7 +50,7 @@ def store_result(case: Case, result: ContactResult, path: Path) -> str:
         }
     values["version"] = version("asperity")
     arrays = {key: getattr(result, key) for key in presets.FIELDS} | curves
-    arrays["values"] = np.array(json.dumps(values, default=float))
+    arrays["values"] = np.array(json.dumps(values, default=float).encode())
     with ZipFile(path, "w", ZIP_DEFLATED, compresslevel=9) as file:
         for name, values in arrays.items():
             buffer = io.BytesIO()

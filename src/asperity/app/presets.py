@@ -76,7 +76,7 @@ def stored_result(case: Case) -> StoredResult | None:
         return None
     data = files("asperity.app").joinpath("preset_data", name).read_bytes()
     with np.load(io.BytesIO(data), allow_pickle=False) as stored:
-        values: Numbers = json.loads(str(stored["values"]))
+        values: Numbers = json.loads(stored["values"].item())
         spectrum = values.pop("spectrum")
         if spectrum is not None:
             curves = {key: stored[f"spectrum_{key}"] for key in CURVES}

@@ -99,15 +99,15 @@ def compile_calls(to_compile: list[Call], report: Callable[[int, int], None] | N
 
 
 def compile_ahead(report: Callable[[int, int], None]) -> None:
-    """Compile all kernels unless one is stored; `report` gets their number and total.
+    """Compile all kernels; `report` gets their number and total.
 
-    The other process is of use only where the cache is writable.
+    Do nothing if one is stored, or where none can be stored for later processes.
     """
     to_compile = calls()
     kernels = [kernel for kernel, _ in to_compile]
-    if any(map(is_compiled, kernels)):
+    if any(map(is_compiled, kernels)) or not all(map(is_cached, kernels)):
         return
-    if cores() < 2 or not all(map(is_cached, kernels)):
+    if cores() < 2:
         compile_calls(to_compile, report)
         return
     helper = subprocess.Popen(
