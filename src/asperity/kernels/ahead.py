@@ -8,14 +8,12 @@ import subprocess
 import sys
 from collections.abc import Callable
 from importlib import import_module
-from operator import methodcaller
 
-import numba
 import numpy as np
 
 from asperity.core.arrays import Field
 from asperity.core.processes import cores
-from asperity.kernels.compiled import is_cached, is_compiled
+from asperity.kernels.compiled import compile_for, is_cached, is_compiled
 from asperity.kernels.line_relaxation import LineFactors
 from asperity.kernels.load_sharing import CellState, ContactBounds
 from asperity.kernels.reynolds import Faces, Film, Liquid, PressureChange, Rows
@@ -95,7 +93,7 @@ def compile_calls(to_compile: list[Call], report: Callable[[int, int], None] | N
     for number, (kernel, arguments) in enumerate(to_compile):
         if report is not None:
             report(number, len(to_compile))
-        methodcaller("compile", tuple(map(numba.typeof, arguments)))(kernel)
+        compile_for(kernel, arguments)
 
 
 def compile_ahead(report: Callable[[int, int], None]) -> None:

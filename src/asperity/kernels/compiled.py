@@ -15,6 +15,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import lru_cache
 from hashlib import sha256
+from operator import methodcaller
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -128,6 +129,11 @@ def njit(*, cache: bool, **options: Any) -> Callable[[Kernel], Kernel]:
         return typed
 
     return compiled
+
+
+def compile_for(kernel: Callable[..., object], arguments: tuple[object, ...]) -> None:
+    """Compile a kernel for the types of arguments, or load it from the cache."""
+    methodcaller("compile", tuple(map(numba.typeof, arguments)))(kernel)
 
 
 def is_cached(kernel: object) -> bool:
