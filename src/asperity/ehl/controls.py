@@ -43,9 +43,9 @@ class MixedNewton:
     # in contact films: change of gap below which the next step linearises the opening of the wedge
     settled_gap_change: float = 0.1
     # with exact face mobilities, of one step:
-    max_film_decrease: float = 0.8  # in a cell's film
+    max_film_decrease: float = 0.8  # in a cell's film ...
+    closing_film: float = 0.5  # ... and, in a time step, this share of the rms roughness
     max_pressure_change: float = 2.0  # in a cell's pressure, or in p_h if that is more
-    min_share: float = 1e-3
     remembered_residuals: int = 6  # the residual may rise to the largest of them
     least_damping: float = 1.0 / 16.0
     whole_step_residual: float = 0.1  # below it a step is taken whole
@@ -66,6 +66,9 @@ class MixedLinearSolver:
     # ... with exact face mobilities, whose rows differ by more, from this residual on
     tolerance_exact: float = 1e-2
     exact_residual: float = 0.1
+    # ... in a time step the residual, between the tolerance before and this one: closer steps far
+    # from the solution are not better ones
+    max_tolerance_time_step: float = 0.3
     max_krylov_steps: int = 60
     coarse_relaxation: float = 2.0  # the coarse correction is too stiff against slow modes
     min_multigrid_cells: int = 64  # along both axes, from which multigrid replaces sparse LU

@@ -288,11 +288,8 @@ class _Step:
     def joined(self, oil: Field, solid: Field, last: float) -> Field:
         """Assemble a vector from fields of the oil and of touching cells, and its last entry."""
         vector = np.empty(self.count + self.touching.size + 1, self.linear.real)
-        vector[: self.count], vector[self.count : -1], vector[-1] = (
-            oil.ravel(),
-            solid.ravel()[self.touching],
-            last,
-        )
+        vector[: self.count], vector[-1] = oil.ravel(), last
+        vector[self.count : -1] = solid.ravel()[self.touching]
         return vector
 
     def oil(self, vector: Field) -> Field:
@@ -445,6 +442,9 @@ def _linear_tolerance(linear: MixedLinear) -> float:
             return MIXED_SOLVER.tolerance_conserving
         if not linear.lagrangian and has_thin_film(balance):
             return MIXED_SOLVER.tolerance_separated
+    if balance.problem.exact and balance.problem.past is not None:
+        least, largest = MIXED_SOLVER.tolerance_exact, MIXED_SOLVER.max_tolerance_time_step
+        return min(max(least, residual), largest)
     if balance.problem.exact and residual < MIXED_SOLVER.exact_residual:
         return MIXED_SOLVER.tolerance_exact
     return MIXED_SOLVER.tolerance_smooth if linear.follows_wedge else MIXED_SOLVER.tolerance

@@ -148,18 +148,23 @@ def _line_search(proposal: _StepProposal, *, second_order: bool) -> MixedBalance
 
 
 def _largest_share(step: Pressures, balance: MixedBalance) -> float:
-    """Return the largest share of a step at which no film and no pressure changes by too much."""
+    """Return the largest share of a step at which no film and no pressure changes by too much.
+
+    In a time step, moving asperities close the thin films in front of them.
+    """
     problem, gap, free = balance.problem, balance.gap, balance.solid == FREE
     d_gap = problem.deflection(step.total) + step.approach
-    film_decrease = np.where(free & (gap > problem.contact_gap), -d_gap / gap, 0.0).max()
+    film = gap
+    if problem.past is not None:
+        film = gap + MIXED_NEWTON.closing_film * float(np.std(problem.roughness))
+    film_decrease = np.where(free & (gap > problem.contact_gap), -d_gap / film, 0.0).max()
     pressure_change = np.max(np.abs(step.total) / np.maximum(1.0, balance.unknowns.total))
     tiny = np.finfo(float).tiny
-    largest = min(
+    return min(
         1.0,
-        MIXED_NEWTON.max_film_decrease / max(film_decrease, tiny),
-        MIXED_NEWTON.max_pressure_change / max(pressure_change, tiny),
+        float(MIXED_NEWTON.max_film_decrease / max(film_decrease, tiny)),
+        float(MIXED_NEWTON.max_pressure_change / max(pressure_change, tiny)),
     )
-    return float(max(largest, MIXED_NEWTON.min_share))
 
 
 def _search_below(
