@@ -5,6 +5,7 @@
 import os
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -43,12 +44,29 @@ def in_this_process(monkeypatch):
 
 @pytest.fixture
 def short_tracks(monkeypatch):
-    """Solve running roughness over 4 passages of the Hertz zone instead of 6, in this process.
+    """Solve running roughness on 400 cells and over 4 passages of the Hertz zone, not 6.
 
-    For tests of what is done with running contacts; those of their numbers use the whole tracks.
+    In this process; for tests of what is done with running contacts, not of their numbers.
     """
     for module in ("results.running", "transient.running"):
         monkeypatch.setattr(f"asperity.{module}.PASSAGES", 4)
+    for name in ("MOST_RUNNING_CELLS", "MANY_RUNNING_CELLS"):
+        monkeypatch.setattr(f"asperity.case.case.{name}", 400)
+
+
+@pytest.fixture
+def thinnest_film_only(monkeypatch):
+    """Solve only the contact of a machine with the thinnest film; the others get its numbers."""
+    solve, formulas = map(import_module, ("asperity.machines.solve", "asperity.ehl.film_formulas"))
+    plan_all = solve._plan
+
+    def plan(case, contacts):
+        cases = [case.case(contact) for contact in contacts]
+        films = [formulas.least_film(each.conditions, each.lubricant) for each in cases]
+        plan, _ = plan_all(case, [contacts[films.index(min(films))]])
+        return plan, dict.fromkeys((contact.name for contact in contacts), 0)
+
+    monkeypatch.setattr(solve, "_plan", plan)
 
 
 @pytest.fixture

@@ -25,7 +25,7 @@ REASON = re.compile(r"<!-- not run: (\S.*\S) -->")
 SUCCESS = {0, 3, 4, 5}  # exit codes of a command that did its work
 # pages that show numbers of a running contact; those of others are solved on fewer cells and over
 # fewer passages, and the cases of `new` as they are by test_starters
-SHOW_NUMBERS = {"first-hour.md"}
+SHOW_NUMBERS = {"first-hour.md", "wear.md"}
 SHOWN = re.compile(r"(--[\w-]+|\S+\.\w+)")
 
 
@@ -51,8 +51,7 @@ def test_the_snippets_of_a_page_run(page, tmp_path, monkeypatch, capsys, request
     monkeypatch.chdir(tmp_path)
     if page.path.name not in SHOW_NUMBERS:
         request.getfixturevalue("short_tracks")
-        for name in ("MOST_RUNNING_CELLS", "MANY_RUNNING_CELLS"):
-            monkeypatch.setattr(f"asperity.case.case.{name}", 400)
+        request.getfixturevalue("thinnest_film_only")
     shutil.copytree(ROOT / "examples", "examples")
     names: dict[str, object] = {"__name__": "__main__"}
     for block in snippets(page):
