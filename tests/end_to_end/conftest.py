@@ -23,10 +23,10 @@ def _without_workers(request):
 
 
 @pytest.fixture
-def asp(tmp_path, monkeypatch, capsys):
+def asp(tmp_path, monkeypatch, capsys, short_tracks):  # noqa: ARG001
     """Return a function that runs a command beside a small case: exit code, stdout and stderr."""
     monkeypatch.chdir(tmp_path)
-    few = "[solver]\nsurfaces = 1\nrunning_cells = 600"
+    few = "[solver]\nsurfaces = 1\nrunning_cells = 400"
     alone = PAPER.replace("[256, 256]", "[64, 64]").replace("[solver]", few)
     Path("case.toml").write_text(alone, "utf-8")
 

@@ -21,6 +21,11 @@ TOLERANCE = float(os.environ.get("ASPERITY_GOLDEN_TOLERANCE", "2e-3"))
 NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
+@pytest.fixture
+def short_tracks():
+    """Solve whole tracks instead: the README shows their numbers."""
+
+
 def matches(printed: str, shown: str) -> bool:
     """Return True for the same words, with numbers within the tolerance or one unit in the last
     digit.
