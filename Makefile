@@ -5,8 +5,9 @@ BIN := $(VENV)/bin
 BASE := $(VENV)/.base
 READY := $(VENV)/.ready
 
-# a process runs whole files, so that it prepares what their tests share once; tests/conftest.py puts slow files first
-BY_FILE := --dist loadfile --no-loadscope-reorder
+# a process runs whole files, so that it prepares what their tests share once; tests/conftest.py puts slow files first;
+# one process more than there are processors, as some tests wait
+PARALLEL := -n $(shell echo $$(($$(getconf _NPROCESSORS_ONLN) + 1))) --dist loadfile --no-loadscope-reorder
 
 .PHONY: demo test quick check bench docs installed release attacks clean
 .DEFAULT_GOAL := demo
@@ -15,10 +16,10 @@ demo: $(BASE)
 	$(BIN)/asperity demo
 
 test: $(READY)
-	$(BIN)/python -m pytest -n auto $(BY_FILE)
+	$(BIN)/python -m pytest $(PARALLEL)
 
 quick: $(READY)
-	$(BIN)/python -m pytest -n auto $(BY_FILE) -q -m "not slow" tests/unit
+	$(BIN)/python -m pytest $(PARALLEL) -q -m "not slow" tests/unit
 
 check: $(READY)
 	$(BIN)/ruff check .
@@ -40,7 +41,6 @@ release: $(READY)
 
 attacks: $(READY)
 	$(BIN)/python -m benchmarks.attacks --share 0.02
-	$(BIN)/python -m benchmarks.crashes 2
 
 # the site, in build/site: warnings are errors, nothing is fetched
 docs: $(READY)

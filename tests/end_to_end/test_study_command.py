@@ -195,6 +195,7 @@ def test_the_verdict_comes_first_and_failures_are_reported(asp):
     assert re.fullmatch(r"error: 1 of 2 cases failed; the first: .*\n", err)
 
 
+@pytest.mark.workers
 def test_a_dry_run_estimates_the_cost(asp):
     code, out, err = asp("study", str(CASE), "--dry-run", *WORDS, "--workers", "4", "--json")
     assert (code, err) == (0, "")
