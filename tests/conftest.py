@@ -62,7 +62,7 @@ def thinnest_film_only(monkeypatch):
 
     def plan(case, contacts):
         cases = [case.case(contact) for contact in contacts]
-        films = [formulas.least_film(each.conditions, each.lubricant) for each in cases]
+        films = [formulas.least_film(other.conditions, other.lubricant) for other in cases]
         plan, _ = plan_all(case, [contacts[films.index(min(films))]])
         return plan, dict.fromkeys((contact.name for contact in contacts), 0)
 

@@ -182,8 +182,8 @@ def test_a_change_without_a_speed_states_the_reason():
 
 @pytest.fixture
 def short(monkeypatch):
-    """Average load shares over six passages."""
-    monkeypatch.setattr(lift_off, "PASSAGES", 6)
+    """Average load shares over four passages."""
+    monkeypatch.setattr(lift_off, "PASSAGES", 4)
 
 
 @cache

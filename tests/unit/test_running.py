@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from asperity.case import case_template, load_case
+from asperity.case import case_template, load_case, load_machine
 from asperity.contact.grid import Grid
 from asperity.core.errors import BadInput, NotConverged
 from asperity.ehl import half_as_many, least_film, running_cells, solve_contact
@@ -27,6 +27,7 @@ from asperity.transient import (
     time_means,
 )
 from asperity.transient.motion import step_seconds
+from asperity.transient.running import TOLERANCE
 
 PAPER = Path(__file__).parents[2] / "examples" / "paper.toml"
 RUNNING = {"grid.cells": [64, 32]}
@@ -244,6 +245,23 @@ def test_a_track_too_short_for_its_scatter_leaves_friction_undetermined(monkeypa
     assert (run.friction_interval.low, run.friction_interval.high) == (None, None)
     rows = dict(uncertainty_rows(run.error, run.friction_interval))
     assert rows["µ, 90 % interval"] == "not determined"
+    assert any(note.startswith("Too little roughness passes") for note in run.notes)
+
+
+def test_time_steps_of_a_gear_contact_take_few_newton_steps():
+    """12 in the mean and 41 at most where one thin film limited the step of all cells."""
+    machine = load_machine(PAPER.with_name("fzg-c.toml"))
+    case = machine.case(machine.contacts[2]).with_overrides({"solver.running_cells": 1200})
+    surfaces = running_surfaces(case).on_cells((46, 28))
+    options = replace(case.options, tolerance=TOLERANCE)
+    snapshots = moving_contact(
+        case.conditions, case.lubricant, surfaces, time_step=2.0, options=options
+    )
+    taken = [snapshot.solution.convergence for snapshot in islice(snapshots, 1, 41)]
+    assert all(convergence.converged for convergence in taken)
+    counts = [convergence.iterations for convergence in taken]
+    assert np.mean(counts) < 9.0
+    assert max(counts) < 16
 
 
 def test_repeated_tracks_scatter_by_their_means():

@@ -123,7 +123,7 @@ def test_a_film_that_would_lose_its_viscosity_is_warmed_in_steps():
     given = (
         contact(speed=19.1, hardness=2e9),
         barus(),
-        rough(grid((40, 40)), 0.5e-6, correlation_length=40e-6),
+        rough(grid((48, 48)), 0.5e-6, correlation_length=30e-6),
     )
     warm = solve_thermal_contact(*given, thermal=WARM)
     assert friction_and_heat(warm, thermal=WARM)[1].film_max_k > 150.0

@@ -199,7 +199,7 @@ def test_a_larger_wear_coefficient_accelerates_wear_proportionally():
 
 def test_halving_the_jump_hardly_changes_roughness_and_load_share():
     whole, half = (
-        worn(0.4, {"wear.k": ["3e-17 1/Pa", "0 1/Pa"], "wear.step": step}) for step in (0.04, 0.02)
+        worn(0.25, {"wear.k": ["3e-17 1/Pa", "0 1/Pa"], "wear.step": step}) for step in (0.04, 0.02)
     )
     assert len(half.table) > 1.3 * len(whole.table)
     for key in ("sq_m", "clr"):

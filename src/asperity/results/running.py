@@ -238,6 +238,10 @@ def _notes(running: Running, tracks: list[Series], outcomes: list[Determined[Ser
                 f"The load share of track {number} is not stationary after {series.length} "
                 "passages of the Hertz zone; the mean is that of the second half."
             )
+    if outcomes[0].value is not None and running.numbers["friction_error"] is None:
+        notes.append(
+            "Too little roughness passes to determine the interval of the friction coefficient."
+        )
     if running.failed:
         notes.append(
             f"{running.failed} of {running.steps} time steps did not reach the tolerance; the "
