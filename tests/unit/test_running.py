@@ -248,11 +248,14 @@ def test_a_track_too_short_for_its_scatter_leaves_friction_undetermined(monkeypa
     assert any(note.startswith("Too little roughness passes") for note in run.notes)
 
 
-def test_time_steps_of_a_gear_contact_take_few_newton_steps():
-    """12 in the mean and 41 at most where one thin film limited the step of all cells."""
+@pytest.mark.parametrize(("contact", "cells", "mean"), [(2, (46, 28), 8.0), (5, (50, 26), 7.0)])
+def test_time_steps_of_a_gear_contact_take_few_newton_steps(contact, cells, mean):
+    """12 and 10 in the mean, 41 at most, where one thin film limited the step of all cells; 7.6 in
+    the second contact with linear equations solved to a tenth or closer.
+    """
     machine = load_machine(PAPER.with_name("fzg-c.toml"))
-    case = machine.case(machine.contacts[2]).with_overrides({"solver.running_cells": 1200})
-    surfaces = running_surfaces(case).on_cells((46, 28))
+    case = machine.case(machine.contacts[contact]).with_overrides({"solver.running_cells": 1200})
+    surfaces = running_surfaces(case).on_cells(cells)
     options = replace(case.options, tolerance=TOLERANCE)
     snapshots = moving_contact(
         case.conditions, case.lubricant, surfaces, time_step=2.0, options=options
@@ -260,7 +263,7 @@ def test_time_steps_of_a_gear_contact_take_few_newton_steps():
     taken = [snapshot.solution.convergence for snapshot in islice(snapshots, 1, 41)]
     assert all(convergence.converged for convergence in taken)
     counts = [convergence.iterations for convergence in taken]
-    assert np.mean(counts) < 9.0
+    assert np.mean(counts) < mean
     assert max(counts) < 16
 
 
