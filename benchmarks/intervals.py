@@ -2,7 +2,7 @@
 sample.
 
 A contact counts if it converged on both grids and its interval is determined. This calibrates
-`asperity.ehl.strategies.grid_continuation.grid_error`, whose factors were chosen on forty of these
+`asperity.ehl.grid_error.grid_error`, whose factors were chosen on forty of these
 contacts.
 """
 

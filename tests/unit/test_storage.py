@@ -12,7 +12,7 @@ from asperity.core.errors import AsperityError, BadInput, UnreadableFile
 from asperity.core.storage import netcdf_bytes, write_with_digest
 from asperity.ehl import ContactSolution, Convergence, Iteration, Options, SolveStatus
 from asperity.ehl.contact_solution import FORMAT
-from asperity.ehl.outcome import ATTEMPTS, Figures, GridError
+from asperity.ehl.outcome import Figures, GridError, Strategy
 from asperity.lubricant import (
     Barus,
     DowsonHigginson,
@@ -22,6 +22,7 @@ from asperity.lubricant import (
     Roelands,
 )
 from asperity.solution import load_solution
+from asperity.solution.storage import EARLIER_TEXTS
 from asperity.surface import Surface
 
 
@@ -56,7 +57,7 @@ def solution():
             steps,
             3e-7,
             0.1 + 0.2,
-            ATTEMPTS[2],
+            Strategy.FIXED_APPROACH,
             small,
             GridError(
                 car=0.2 / 3.0,
@@ -109,6 +110,17 @@ def test_every_number_is_restored_bit_for_bit(solution, tmp_path):
 def test_other_lubricants_and_none_are_restored(solution, tmp_path, changes):
     changed = replace(solution, **changes)
     assert_equal(load_solution(changed.save(tmp_path / "run.nc")), changed)
+
+
+@pytest.mark.parametrize("text", EARLIER_TEXTS)
+def test_strategies_of_earlier_versions_are_read(solution, tmp_path, monkeypatch, text):
+    described = solution._described()
+    described["convergence"]["attempt"] = text
+    monkeypatch.setattr(ContactSolution, "_described", lambda _: described)
+    assert (
+        load_solution(solution.save(tmp_path / "run.nc")).convergence.attempt
+        == (EARLIER_TEXTS[text])
+    )
 
 
 def test_infinities_of_an_unfinished_solve_are_restored(solution, tmp_path):

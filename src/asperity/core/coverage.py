@@ -1,7 +1,8 @@
 """Coverage of every computed interval, 90 %; texts and tables take it from here.
 
-To change it, set `COVERAGE` and `NORMAL_FACTOR`, calibrate `ERROR_ESTIMATE` (`ehl.controls`) again,
-and adapt the 90 % limits from the literature: `solution.traction`, `lubricant.model`, `wear.laws`.
+To change it, set `COVERAGE` and `NORMAL_FACTOR`, calibrate `ERROR_ESTIMATE` (`ehl.grid_error`)
+again, and adapt the 90 % limits from the literature: `solution.traction`, `lubricant.model`,
+`wear.laws`.
 Sobol indices have intervals of their own (`study.sensitivity_indices.CONFIDENCE`).
 """
 

@@ -15,7 +15,7 @@ import scipy
 
 from asperity.core.arrays import Field, Mask
 from asperity.core.errors import BadInput, NotConverged, require_positive
-from asperity.ehl.controls import RIGID_FILM
+from asperity.ehl.controls import RIGID_FILM, STEP_LIMITS
 from asperity.lubricant import Barus, DensityLaw, Incompressible, ViscosityLaw
 
 
@@ -169,7 +169,7 @@ def _solve_newton(channel: "RoughChannel", tolerance: float) -> tuple[Field, "Fl
         if residual < 0.9 * best:
             best, stagnation, damping = residual, 0, min(1.0, 1.5 * damping)
         elif stagnation == RIGID_FILM.stagnation_iterations:  # damp alternating cells
-            best, stagnation, damping = residual, 0, max(0.5 * damping, RIGID_FILM.min_damping)
+            best, stagnation, damping = residual, 0, max(0.5 * damping, STEP_LIMITS.min_damping)
         signed = signed + damping * channel.limit_step(signed, -_newton_step(flows))
         steps += 1
 

@@ -245,7 +245,7 @@ class ContactSolution(Displayed):
                 "status": convergence.status.value,
                 "tolerance": convergence.tolerance,
                 "seconds": convergence.seconds,
-                "attempt": convergence.attempt,
+                "attempt": convergence.attempt.value,
                 **{
                     name: getattr(convergence, name) and asdict(getattr(convergence, name))
                     for name in ERRORS

@@ -8,6 +8,16 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Residuals:
+    """Residuals at which the search changes its method."""
+
+    near_solution: float = 0.1  # a result with more is no initial guess for the next grid
+    guess: float = 1e-2  # of the first-order wedge or the dry contact, before the equations solved
+    coarse_grid: float = 1e-3  # of a coarser grid, whose solution only has to be a good guess
+    divergence: float = 10.0  # ratio to the initial residual from which steps seldom recover
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class StepLimits:
     """Largest changes of one Newton step, of all models; further ones are in `MixedNewton`."""
 
@@ -16,30 +26,26 @@ class StepLimits:
     # in a²/R or rms roughness, whichever is more: a contact at the cap responds nonlinearly
     max_approach_step: float = 0.3
     approach_growth: float = 1.2  # of the approach limit from step to step without reversal
+    stagnation_iterations: int = 8  # without a decrease, until the damping changes
+    required_decrease: float = 0.9  # of the lowest residual, to count as a decrease
+    min_damping: float = 1.0 / 16.0  # a line search stops there
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SinglePressureNewton:
     """Newton iteration of the single-pressure model."""
 
-    stagnation_iterations: int = 8  # without a decrease, until the damping changes
-    required_decrease: float = 0.9  # of the lowest residual, to count as a decrease
     time_step_residual: float = 0.05  # below it pseudo-time steps grow
-    linear_tolerance: float = 0.1  # relative residual of GMRES: an inexact Newton method
-    max_krylov_steps: int = 60
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MixedNewton:
     """Newton iteration of the mixed model."""
 
-    stagnation_iterations: int = 8  # without a decrease, until the damping changes
-    required_decrease: float = 0.9  # of the lowest residual, to count as a decrease
     min_content_share: float = 0.2  # of its content that a ruptured cell keeps in one step
     state_offset: float = 1e-9  # beyond a state's bound, puts a cell into the next state
     line_search_residual: float = 0.03  # below it a step that increases the residual is halved
     max_residual_growth: float = 1.5  # of a step that is not halved
-    min_damping: float = 0.1  # the line search stops there
     # in contact films: change of gap below which the next step linearises the opening of the wedge
     settled_gap_change: float = 0.1
     # with exact face mobilities, of one step:
@@ -47,34 +53,27 @@ class MixedNewton:
     closing_film: float = 0.5  # ... and, in a time step, this share of the rms roughness
     max_pressure_change: float = 2.0  # in a cell's pressure, or in p_h if that is more
     remembered_residuals: int = 6  # the residual may rise to the largest of them
-    least_damping: float = 1.0 / 16.0
-    whole_step_residual: float = 0.1  # below it a step is taken whole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MixedLinearSolver:
-    """Linear solver of the mixed model's Newton steps."""
+    """Linear solver of the mixed model's Newton steps; `KrylovMethod` has the usual tolerance."""
 
-    tolerance: float = 0.1  # relative residual of GMRES ...
-    tolerance_smooth: float = 0.05  # ... for smooth bodies, whose steps are few and nearly linear
-    # ... for conserved oil between bodies that touch nowhere, if their film is a small difference
-    # of far larger deflections (`thin_film`, a²/R): the cavity's equations dominate the residual
-    tolerance_separated: float = 0.01
+    tolerance_smooth: float = 0.05  # for smooth bodies, whose steps are few and nearly linear
+    # for exact face mobilities near the solution, whose rows differ by more; and for conserved oil
+    # between bodies that touch nowhere, if their film is a small difference of far larger
+    # deflections (`thin_film`, a²/R): the cavity's equations dominate the residual
+    tolerance_close: float = 1e-2
     thin_film: float = 1e-3
-    tolerance_conserving: float = 3e-3  # ... for oil conserved along its path ...
+    tolerance_conserving: float = 3e-3  # for oil conserved along its path ...
     conserving_residual: float = 3e-2  # ... from this residual on: the mass balance is met closer
-    # ... with exact face mobilities, whose rows differ by more, from this residual on
-    tolerance_exact: float = 1e-2
-    exact_residual: float = 0.1
-    # ... in a time step the residual, between the tolerance before and this one: closer steps far
-    # from the solution are not better ones
+    # in a time step the residual, between `tolerance_close` and this one: closer steps far from the
+    # solution are not better ones
     max_tolerance_time_step: float = 0.3
-    max_krylov_steps: int = 60
     coarse_relaxation: float = 2.0  # the coarse correction is too stiff against slow modes
     min_multigrid_cells: int = 64  # along both axes, from which multigrid replaces sparse LU
     # share of the flattened cells: fewer nearly closed ones make the contact firm
     max_nearly_closed: float = 0.1
-    uncoupled_approach_step: float = 0.5  # in p_h, if only the approach can change the load
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,6 +91,8 @@ class Preconditioner:
 class KrylovMethod:
     """GMRES and its variant with a frequency."""
 
+    tolerance: float = 0.1  # relative residual: an inexact Newton method
+    max_steps: int = 60
     initial_vectors: int = 7  # allocated at first
     reorthogonalise: float = 0.5  # share of a vector left, below which it is orthogonalised again
     reorthogonalise_shifted: float = 0.1  # the same, where all vectors stay in single precision
@@ -136,14 +137,12 @@ class PlasticDry:
     max_load_corrections: int = 40  # rounds that redistribute load cut off by the bounds
     max_active_sets: int = 16
     linear_tolerance: float = 0.3  # relative residual of conjugate gradients in an active set
-    max_krylov_steps: int = 60  # of conjugate gradients in an active set
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InitialGuess:
     """Dry contact as an initial guess."""
 
-    dry_tolerance: float = 1e-2  # residual of plastic bodies: oil changes them far more
     first_asperities: float = 2.0  # height of the first touching asperities, in rms roughness
     max_gradient_steps: int = 60  # of projected conjugate gradients ...
     max_newton_steps: int = 20  # ... and then of Newton's method
@@ -156,7 +155,6 @@ class LocalRefinement:
     worst_residual: float = 0.05  # in the largest residual: cells that belong to a box ...
     min_residual_share: float = 0.5  # ... if they hold this share of the sum of squares
     max_box_share: float = 0.25  # of the grid's cells: larger boxes do not pay
-    min_residual: float = 1e-3  # of an initial guess that needs refinement
     margin: int = 6  # cells around the worst ones in a box ...
     fixed_margin: int = 2  # ... of which the outer ones are fixed
     target: float = 0.03  # ratio of the box's residual to its initial one
@@ -167,34 +165,11 @@ class LocalRefinement:
 class GridContinuation:
     """Search from the coarsest grid to the finest."""
 
-    coarse_tolerance: float = 1e-3  # a coarse solution only has to be a good initial guess
-    max_coarse_iterations: int = 40
-    max_fixed_iterations: int = 40  # at one approach, while the approach is bracketed
-    min_residual: float = 1e-2  # reference of the divergence tests for smaller initial residuals
-    # ratio to the initial residual: the third-order wedge started too far away
-    divergence: float = 10.0
-    failed_residual: float = 0.1  # a coarse solution with more is no initial guess
+    # on a coarser grid, at one approach while it is bracketed, or of the second-order wedge
+    max_iterations: int = 40
     elastic_tolerance: float = 0.1  # of dry elastic bodies, in that of the Newton step after it
     min_coarse_inlet_cells: float = 2.0  # across the inlet of a line contact: else it closes
     separating_film_ratio: float = 1.5  # minimum film over Sq, from which oil separates the bodies
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DiscretisationError:
-    """Error bars from the last grids, calibrated for `core.coverage` (benchmark row: intervals)."""
-
-    forward: float = 2.5  # in the difference d of the last two grids, in its direction ...
-    backward: float = 1.5  # ... and against it
-    min_difference: float = 0.25  # in the difference between the two grids before
-    load_share_per_cell: float = 2.4  # in the squared cell [half-widths²]: unresolved load share
-    two_order_share: float = 0.85  # of all this, if both orders of the wedge are known
-    load_share_forward: float = 2.0  # the same of the load share, if three grids are known too
-    load_share_backward: float = 0.5
-    load_share_per_cell_three: float = 1.0
-    # of edge pressure and end film, in d: their error falls with the cell, not with its square
-    end_factor: float = 3.0
-    max_end_growth: float = 10.0  # times that, of a figure that does not converge with the grid
-    end_scatter: float = 0.03  # share of a figure below which differences have no trend
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -204,24 +179,18 @@ class MixedSearchControls:
     max_roller_iterations: int = 60  # third-order, on the finest grid: sharp ends take another way
     max_roller_work: float = 1.25  # all steps on all grids, in the allowed work on the finest one
     max_error_grid_iterations: int = 60  # on a coarser grid that only estimates the error
-    first_order_tolerance: float = 1e-2  # of the first-order wedge before the second-order one
     max_first_order_iterations: int = 80
-    max_second_order_iterations: int = 40
     max_backward_iterations: int = 20  # from second order back to first, for the error estimate ...
     backward_tolerance: float = 0.2  # ... until a step moves the load share by less of its change
-    max_restart_iterations: int = 12  # second order from a coarser grid to `first_order_tolerance`
+    max_restart_iterations: int = 12  # second order from a coarser grid to `Residuals.guess`
     # sum of gains and losses over the throughflow, if conserving ...
     max_imbalance: float = 1e-6
     imbalance_to_tolerance: float = 1e-2  # ... or this share of the tolerance, if that is more
     rounding: float = 1e-12  # residual that is rounding: in a wide inlet it is much oil
     max_smooth_turns: int = 4  # of Newton and local refinement for smooth bodies on a coarse grid
     steps_per_turn: int = 2
-    divergence: float = 10.0  # ratio to the initial residual from which steps seldom recover
-    smooth_coarse_residual: float = 1e-2  # a coarse smooth solution with more is no initial guess
-    dry_film_ratio: float = 1.0  # below it the dry contact is the better initial guess
     max_exact_iterations: int = 80  # with exact face mobilities, from arithmetic means ...
     max_time_step_iterations: int = 30  # ... or from the time step before
-    guess_tolerance: float = 1e-2  # of the solution with arithmetic means
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -255,11 +224,11 @@ class RigidFilm:
 
     max_steps: int = 200
     max_log_viscosity_step: float = 1.0  # change of log viscosity in one cell and step
-    stagnation_iterations: int = 4  # without a decrease, until steps are halved ...
-    min_damping: float = 0.1  # ... down to this share
+    stagnation_iterations: int = 4  # without a decrease, until steps are halved
     tolerance: float = 1e-11  # largest imbalance of a cell, in the flow
 
 
+RESIDUALS = Residuals()
 STEP_LIMITS = StepLimits()
 NEWTON = SinglePressureNewton()
 MIXED_NEWTON = MixedNewton()
@@ -272,7 +241,6 @@ PLASTIC_DRY = PlasticDry()
 GUESS = InitialGuess()
 REFINEMENT = LocalRefinement()
 CONTINUATION = GridContinuation()
-ERROR_ESTIMATE = DiscretisationError()
 SEARCH = MixedSearchControls()
 MARCHING = TimeMarching()
 MENISCUS = Meniscus()

@@ -56,15 +56,16 @@ class Options:
             )
 
 
-# strategies in their order, until one converges
-ATTEMPTS = (
-    "coarse to fine",
-    # smooth bodies only, which start with a third-order wedge
-    "with the second-order wedge of rough surfaces",
-    "at fixed approach, found by bracketing",
-)
-FROM_DRY = "from the dry contact"  # models with two pressures only
-ARITHMETIC = "with arithmetic mean mobilities"  # heated films whose exact ones do not converge
+class Strategy(StrEnum):
+    """Way to a solution; its text completes the sentence on the outcome."""
+
+    COARSE_TO_FINE = "coarse to fine"
+    # smooth bodies only, whose usual wedge is third order
+    SECOND_ORDER = "with the second-order wedge of rough surfaces"
+    FIXED_APPROACH = "at fixed approach, found by bracketing"
+    FROM_DRY = "from the dry contact"  # models with two pressures only
+    # heated films whose exact mobilities do not converge
+    ARITHMETIC_MEANS = "with arithmetic mean mobilities"
 
 
 class SolveStatus(StrEnum):
@@ -169,7 +170,7 @@ class Convergence:
     history: tuple[Iteration, ...]
     tolerance: float
     seconds: float
-    attempt: str = ATTEMPTS[0]
+    attempt: Strategy = Strategy.COARSE_TO_FINE
     iteration_error: Figures | None = None
     discretisation_error: GridError | None = None
 
@@ -193,9 +194,10 @@ class Convergence:
     def explain(self) -> str:
         """Return one sentence on the outcome of the solve."""
         last = self.history[-1]
-        tried = "" if self.attempt == ATTEMPTS[0] else f" ({self.attempt})"
-        if self.attempt == FROM_DRY:  # the first attempt for thin films, the second for thick ones
-            tried = f" {FROM_DRY}"
+        tried = "" if self.attempt == Strategy.COARSE_TO_FINE else f" ({self.attempt})"
+        # the first attempt for thin films, the second for thick ones
+        if self.attempt == Strategy.FROM_DRY:
+            tried = f" {self.attempt}"
         return (
             f"{self.status}{tried} after {self.iterations} steps in {self.seconds:.2f} s: "
             f"residual {last.residual:.1e}, load error {last.load_error:.1e}, change "

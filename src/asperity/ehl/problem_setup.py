@@ -14,7 +14,7 @@ from asperity.ehl.film_formulas import central_film, least_film, least_films
 from asperity.ehl.grid_design import MIN_CELLS_SHORT_AXIS, MIN_COARSE_CELLS, inlet_length
 from asperity.ehl.inlet_layer import InletLayer
 from asperity.ehl.models.single_pressure import Problem
-from asperity.ehl.outcome import ARITHMETIC, ATTEMPTS, CONSERVING, TWO_PRESSURES, Options
+from asperity.ehl.outcome import CONSERVING, TWO_PRESSURES, Options, Strategy
 from asperity.ehl.roller_profile import BodyShape, RollerProfile
 from asperity.ehl.scales import Scales
 from asperity.lubricant import Lubricant
@@ -28,9 +28,9 @@ def contact_problem(
     options: Options,
     viscosity_factor: Field | None = None,
     *,
-    attempt: str = ATTEMPTS[0],
+    strategy: Strategy = Strategy.COARSE_TO_FINE,
 ) -> Problem:
-    """Return the dimensionless problem of an attempt on the surface's grid."""
+    """Return the dimensionless problem of a strategy on the surface's grid."""
     scales = Scales.from_conditions(conditions, lubricant)
     grid, line = surface.grid, conditions.endless
     (dx, dy) = grid.spacing
@@ -49,12 +49,12 @@ def contact_problem(
         p_scale=scales.pressure,
         lubricant=lubricant,
         viscosity_factor=viscosity_factor,
-        accurate=attempt == ATTEMPTS[0]
+        accurate=strategy == Strategy.COARSE_TO_FINE
         and not np.any(surface.heights)
         and options.model != CONSERVING,
         exact=options.model in TWO_PRESSURES
         and lubricant is not None
-        and attempt != ARITHMETIC
+        and strategy != Strategy.ARITHMETIC_MEANS
         and bool(np.any(surface.heights)),
         conserve=options.model == CONSERVING and lubricant is not None,
         inlet_layer=_inlet_layer(options, scales),

@@ -12,13 +12,13 @@ from asperity.contact.grid import Grid
 from asperity.core.arrays import Field, usual_float_errors
 from asperity.core.errors import BadInput, NotConverged
 from asperity.ehl.contact_solution import ContactSolution
-from asperity.ehl.controls import CONTINUATION, SEARCH
+from asperity.ehl.controls import CONTINUATION, RESIDUALS, SEARCH
 from asperity.ehl.far_pressure import build_up_lengths
 from asperity.ehl.film_formulas import central_film, require_thin_film
 from asperity.ehl.models.elastic_dry import elastic_contact
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.single_pressure import Step, newton
-from asperity.ehl.outcome import ARITHMETIC, ATTEMPTS, FROM_DRY, PAPER, Options
+from asperity.ehl.outcome import PAPER, Options, Strategy
 from asperity.ehl.problem_setup import (
     contact_problem,
     first_guess,
@@ -28,7 +28,7 @@ from asperity.ehl.problem_setup import (
 )
 from asperity.ehl.scales import Scales
 from asperity.ehl.strategies.grid_continuation import Progress, Search
-from asperity.ehl.strategies.mixed_search import COARSE_TO_FINE, ROBUST, MixedSearch
+from asperity.ehl.strategies.mixed_search import MixedSearch
 from asperity.ehl.strategies.oil_state import pressures_of
 from asperity.ehl.strategies.starved_inlet import emptied_inlet, march_to_steady, passes_less
 from asperity.lubricant import Lubricant, require_liquid
@@ -117,12 +117,12 @@ def solve_unified(
     else:
         levels = [finest]
         guess = _warm_start(start, finest, scales)
-    for attempt in ATTEMPTS:
-        if attempt == ATTEMPTS[1]:
+    for strategy in (Strategy.COARSE_TO_FINE, Strategy.SECOND_ORDER, Strategy.FIXED_APPROACH):
+        if strategy == Strategy.SECOND_ORDER:
             if not finest.accurate:
                 continue
             levels = [replace(level, accurate=False) for level in levels]
-        step = search.solve_levels(levels, *guess, fixed=attempt == ATTEMPTS[2])
+        step = search.solve_levels(levels, *guess, fixed=strategy == Strategy.FIXED_APPROACH)
         if search.converged(options.tolerance):
             break
     solution = search.solution(
@@ -131,7 +131,7 @@ def solve_unified(
         conditions,
         lubricant,
         seconds=time.perf_counter() - began,
-        attempt=attempt,
+        strategy=strategy,
         start=start,
     )
     return replace(solution, viscosity_factor=viscosity_factor)
@@ -154,12 +154,12 @@ def solve_mixed(
     full_problem = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
     finest = reduced_problem(full_problem)
     search = MixedSearch(options, scales.gap, progress)
-    if start is not None and start.convergence.attempt == ARITHMETIC:
+    if start is not None and start.convergence.attempt == Strategy.ARITHMETIC_MEANS:
         search.arithmetic, finest = True, replace(finest, exact=False)
     if conditions.geometry == "roller":
         search.most_work = SEARCH.max_roller_work * options.max_iterations * finest.roughness.size
     if start is not None:
-        strategy, unknowns = COARSE_TO_FINE, pressures_of(start, finest, scales)
+        strategy, unknowns = Strategy.COARSE_TO_FINE, pressures_of(start, finest, scales)
         if options.inlet_layer is None:
             step = search.continue_from(finest, unknowns)
         else:
@@ -172,7 +172,7 @@ def solve_mixed(
         conditions,
         lubricant,
         seconds=time.perf_counter() - began,
-        attempt=ARITHMETIC if search.arithmetic else strategy,
+        strategy=Strategy.ARITHMETIC_MEANS if search.arithmetic else strategy,
         start=start,
     )
     return replace(solution, viscosity_factor=viscosity_factor)
@@ -220,22 +220,26 @@ def _solve_cold(
     surface: Surface,
     conditions: ContactConditions,
     lubricant: Lubricant,
-) -> tuple[str, Step]:
+) -> tuple[Strategy, Step]:
     """Solve without a neighbouring solution; return the strategy and its last step."""
     options, scales = search.options, Scales.from_conditions(conditions, lubricant)
     film, robust = smooth_film(conditions, lubricant), replace(finest, exact=False)
     tolerance, search.is_guess = options.tolerance, finest.exact
     if finest.exact:
-        tolerance = max(tolerance, SEARCH.guess_tolerance)
+        tolerance = max(tolerance, RESIDUALS.guess)
         search.options = replace(options, tolerance=tolerance)
     for strategy in _strategies(surface, film, options.contact_film):
-        problem = robust if strategy == COARSE_TO_FINE else replace(robust, accurate=False)
+        problem = robust if strategy == Strategy.COARSE_TO_FINE else replace(robust, accurate=False)
         levels = usable_levels(problem, conditions, lubricant)
         step = search.solve_by(
             strategy, levels, lambda on: first_guess(on, conditions, lubricant, scales)
         )
         if search.converged(tolerance):
-            if strategy != COARSE_TO_FINE and finest.accurate and finest.form.roller is not None:
+            if (
+                strategy != Strategy.COARSE_TO_FINE
+                and finest.accurate
+                and finest.form.roller is not None
+            ):
                 strategy, step = search.refine_third_order(finest, step)
             search.solve_coarser_grid(robust)
             if finest.exact:
@@ -247,17 +251,13 @@ def _solve_cold(
     return strategy, step
 
 
-def _strategies(surface: Surface, film: float, contact_film: float) -> tuple[str, ...]:
+def _strategies(surface: Surface, film: float, contact_film: float) -> tuple[Strategy, ...]:
     """Return the strategies in their order, by the film [m] of the smooth bodies."""
-    if not np.any(surface.heights):
-        return (
-            (FROM_DRY, COARSE_TO_FINE, ROBUST) if film < contact_film else (COARSE_TO_FINE, ROBUST)
-        )
-    return (
-        (FROM_DRY, COARSE_TO_FINE)
-        if film < SEARCH.dry_film_ratio * surface.sq
-        else (COARSE_TO_FINE, FROM_DRY)
-    )
+    coarse_to_fine, from_dry = Strategy.COARSE_TO_FINE, Strategy.FROM_DRY
+    if np.any(surface.heights):
+        return (from_dry, coarse_to_fine) if film < surface.sq else (coarse_to_fine, from_dry)
+    smooth = (coarse_to_fine, Strategy.SECOND_ORDER)
+    return (from_dry, *smooth) if film < contact_film else smooth
 
 
 class ElasticSearch(Search):

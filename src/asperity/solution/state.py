@@ -34,7 +34,7 @@ def balance_of(solution: ContactSolution, *, whole: bool = True) -> Balance | Mi
         solution.surface,
         solution.options,
         solution.viscosity_factor,
-        attempt=solution.convergence.attempt,
+        strategy=solution.convergence.attempt,
     )
     if not whole and problem.uniform:
         problem = on_one_line(problem)

@@ -22,11 +22,17 @@ from asperity.ehl import (
     SolveStatus,
 )
 from asperity.ehl.contact_solution import DESCRIBED, ERRORS, FORMAT, HEADINGS, OIL, STEPS
+from asperity.ehl.outcome import Strategy
 from asperity.lubricant import make_lubricant
 from asperity.surface import Surface
 
 if TYPE_CHECKING:
     import xarray
+
+EARLIER_TEXTS = {  # of strategies, in files of earlier versions
+    "with the second-order wedge of rough bodies": Strategy.SECOND_ORDER,
+    "with the bodies held while their distance was searched": Strategy.FIXED_APPROACH,
+}
 
 
 def load_solution(path: str | Path) -> ContactSolution:
@@ -117,6 +123,8 @@ def _convergence(described: dict[str, Any], history: tuple[Iteration, ...]) -> C
     values: dict[str, Any] = {
         name: value for name, value in described.items() if name not in ("status", *ERRORS)
     }
+    text = described.get("attempt", Strategy.COARSE_TO_FINE)
+    values["attempt"] = EARLIER_TEXTS.get(text) or Strategy(text)
     errors: dict[str, Any] = dict.fromkeys(ERRORS)
     if described.get("iteration_error"):
         errors["iteration_error"] = Figures(**described["iteration_error"])

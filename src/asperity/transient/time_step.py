@@ -21,7 +21,7 @@ from asperity.ehl.models.mixed import MixedBalance, Pressures, evaluate
 from asperity.ehl.models.single_pressure import Balance, Problem
 from asperity.ehl.models.transient_term import TransientTerm
 from asperity.ehl.newton.single_pressure import Step
-from asperity.ehl.outcome import ATTEMPTS, CONSERVING, MIXED, TWO_PRESSURES
+from asperity.ehl.outcome import CONSERVING, MIXED, TWO_PRESSURES, Strategy
 from asperity.ehl.problem_setup import contact_problem
 from asperity.ehl.strategies.grid_continuation import Search
 from asperity.ehl.strategies.mixed_search import MixedSearch
@@ -32,7 +32,6 @@ from asperity.surface import MovingSurfaces, Surface
 
 Memory = Mapping[str, np.ndarray]
 
-HELD_APPROACH = ATTEMPTS[2]
 _LOWERED = ("lowered_first", "lowered_second")
 
 
@@ -112,7 +111,8 @@ class TransientContact:
         rough = any(surfaces.rough)
         # shares of the bodies in the flattening
         self.shares = [float(is_rough) / max(sum(surfaces.rough), 1) for is_rough in surfaces.rough]
-        self.attempt = ATTEMPTS[1] if rough else ATTEMPTS[0]  # smooth bodies: the accurate wedge
+        # smooth bodies: the accurate wedge
+        self.strategy = Strategy.SECOND_ORDER if rough else Strategy.COARSE_TO_FINE
         self.follows_oil = rough and (
             cells.is_integer() if self.options.model in TWO_PRESSURES else cells == 1.0
         )
@@ -159,14 +159,14 @@ class TransientContact:
         surface = surface or surfaces.composite_at(time_s)
         full_problem = self._problem(surface, self._past(memory))
         problem = _on_one_line(full_problem) if self.one_line else full_problem
-        search, step, attempt = self._search(problem, self._initial_guess(memory, problem))
+        search, step, strategy = self._search(problem, self._initial_guess(memory, problem))
         solution = search.solution(
             step,
             surface,
             self.conditions,
             self.lubricant,
             seconds=time.perf_counter() - began,
-            attempt=attempt,
+            strategy=strategy,
         )
         solution = replace(solution, viscosity_factor=self.viscosity_factor)
         balance = step.balance
@@ -200,18 +200,18 @@ class TransientContact:
             starts.append(Pressures(oil, pressure, approach))
         return min(starts, key=lambda start: self._balance(problem, start).residual_rms)
 
-    def _search(self, problem: Problem, unknowns: Pressures) -> tuple[Search, Step, str]:
-        """Solve a step; return the search, its last iterate and the attempt used."""
+    def _search(self, problem: Problem, unknowns: Pressures) -> tuple[Search, Step, Strategy]:
+        """Solve a step; return the search, its last iterate and the strategy used."""
         if self.options.model in TWO_PRESSURES:
             mixed = MixedSearch(self.options, self.scales.gap, None)
-            return mixed, mixed.continue_from(problem, unknowns), ATTEMPTS[0]
+            return mixed, mixed.continue_from(problem, unknowns), Strategy.COARSE_TO_FINE
         search = Search(self.options, self.scales.gap, None)
         # if Newton's method fails: at fixed approach, found by bracketing
         for fixed in (False, True):
             step = search.solve_levels([problem], unknowns.total, unknowns.approach, fixed=fixed)
             if search.converged(self.options.tolerance):
                 break
-        return search, step, HELD_APPROACH if fixed else ATTEMPTS[0]
+        return search, step, Strategy.FIXED_APPROACH if fixed else Strategy.COARSE_TO_FINE
 
     def _balance(self, problem: Problem, unknowns: Pressures) -> Balance | MixedBalance:
         if self.options.model in TWO_PRESSURES:
@@ -225,7 +225,7 @@ class TransientContact:
             surface,
             self.options,
             self.viscosity_factor,
-            attempt=self.attempt,
+            strategy=self.strategy,
         )
         return replace(steady_problem, past=past)
 

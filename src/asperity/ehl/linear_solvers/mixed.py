@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from asperity.core.arrays import Field, Mask
-from asperity.ehl.controls import MIXED_SOLVER
+from asperity.ehl.controls import KRYLOV, MIXED_SOLVER, RESIDUALS, STEP_LIMITS
 from asperity.ehl.grid_transfer import Index
 from asperity.ehl.linear_solvers.gmres import Workspace, gmres
 from asperity.ehl.linear_solvers.single_pressure import (
@@ -410,14 +410,14 @@ def newton_step(
     missing = step.load_missing(known_total)
     # all cells ruptured or capped: only the approach can change the load
     if step.load_response == 0.0:
-        d_approach = -MIXED_SOLVER.uncoupled_approach_step * float(np.sign(missing))
+        d_approach = -STEP_LIMITS.max_pressure_step * float(np.sign(missing))
         return Pressures(known_oil, known_total, d_approach / balance.rows.contact_scale)
     solved = gmres(
         step.product,
         step.precondition,
         step.right_side(known_oil, known_total, missing),
         tolerance=_linear_tolerance(linear),
-        max_steps=MIXED_SOLVER.max_krylov_steps,
+        max_steps=KRYLOV.max_steps,
         workspace=workspace,
     )
     d_oil = known_oil + np.where(linear.lubricated, step.oil(solved), linear.real(0.0))
@@ -441,10 +441,10 @@ def _linear_tolerance(linear: MixedLinear) -> float:
         if linear.lagrangian and residual < MIXED_SOLVER.conserving_residual:
             return MIXED_SOLVER.tolerance_conserving
         if not linear.lagrangian and has_thin_film(balance):
-            return MIXED_SOLVER.tolerance_separated
+            return MIXED_SOLVER.tolerance_close
     if balance.problem.exact and balance.problem.past is not None:
-        least, largest = MIXED_SOLVER.tolerance_exact, MIXED_SOLVER.max_tolerance_time_step
+        least, largest = MIXED_SOLVER.tolerance_close, MIXED_SOLVER.max_tolerance_time_step
         return min(max(least, residual), largest)
-    if balance.problem.exact and residual < MIXED_SOLVER.exact_residual:
-        return MIXED_SOLVER.tolerance_exact
-    return MIXED_SOLVER.tolerance_smooth if linear.follows_wedge else MIXED_SOLVER.tolerance
+    if balance.problem.exact and residual < RESIDUALS.near_solution:
+        return MIXED_SOLVER.tolerance_close
+    return MIXED_SOLVER.tolerance_smooth if linear.follows_wedge else KRYLOV.tolerance

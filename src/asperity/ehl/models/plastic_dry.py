@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.core.arrays import Field, Mask
-from asperity.ehl.controls import PLASTIC_DRY, STEP_LIMITS
+from asperity.ehl.controls import KRYLOV, PLASTIC_DRY, STEP_LIMITS
 from asperity.ehl.deflection import Deflection
 from asperity.ehl.models.elastic_dry import level_gaps
 from asperity.ehl.models.single_pressure import Problem
@@ -50,7 +50,7 @@ class _Sets(NamedTuple):
         bound[free] += np.float32((self.load - bound.sum(dtype=float)) / np.count_nonzero(free))
         gap = self.undeformed + self.deflection(bound)
         change, level, _ = level_gaps(
-            self.deflection, free, gap, PLASTIC_DRY.linear_tolerance, PLASTIC_DRY.max_krylov_steps
+            self.deflection, free, gap, PLASTIC_DRY.linear_tolerance, KRYLOV.max_steps
         )
         return np.clip(bound + change.astype(np.float32), zero, self.cap), level
 

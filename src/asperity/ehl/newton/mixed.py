@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.core.arrays import Field, Mask
-from asperity.ehl.controls import MIXED_NEWTON
+from asperity.ehl.controls import MIXED_NEWTON, RESIDUALS, STEP_LIMITS
 from asperity.ehl.linear_solvers.gmres import Workspace
 from asperity.ehl.linear_solvers.mixed import newton_step
 from asperity.ehl.linear_solvers.single_pressure import SingularFactor
@@ -99,9 +99,9 @@ class _ResidualWatch:
     def add(self, residual: float) -> None:
         """Add the residual of a step."""
         self.steps += 1
-        if residual < MIXED_NEWTON.required_decrease * self.lowest:
+        if residual < STEP_LIMITS.required_decrease * self.lowest:
             self.lowest, self.steps = residual, 0
-        elif self.steps == MIXED_NEWTON.stagnation_iterations:
+        elif self.steps == STEP_LIMITS.stagnation_iterations:
             self.lowest, self.steps, self.damping = residual, 0, 1.5 - self.damping
             self.stagnated = True
         self.last.append(residual)
@@ -141,7 +141,7 @@ def _line_search(proposal: _StepProposal, *, second_order: bool) -> MixedBalance
         if (
             residual >= MIXED_NEWTON.line_search_residual
             or balance.residual_rms <= MIXED_NEWTON.max_residual_growth * residual
-            or damping <= MIXED_NEWTON.min_damping
+            or damping <= STEP_LIMITS.min_damping
         ):
             return balance
         damping *= 0.5
@@ -176,8 +176,8 @@ def _search_below(
     higher residual.
     """
     problem, bound = proposal.balance.problem, max(watch.last)
-    whole = watch.last[-1] < MIXED_NEWTON.whole_step_residual and not watch.stagnated
-    least = 1.0 if whole else MIXED_NEWTON.least_damping
+    whole = watch.last[-1] < RESIDUALS.near_solution and not watch.stagnated
+    least = 1.0 if whole else STEP_LIMITS.min_damping
     damping, best = 1.0, None
     while True:
         unknowns, freed = proposal.apply(damping)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.core.arrays import Field
-from asperity.ehl.controls import NEWTON, STEP_LIMITS
+from asperity.ehl.controls import KRYLOV, NEWTON, STEP_LIMITS
 from asperity.ehl.linear_solvers.gmres import Operator, gmres
 from asperity.ehl.linear_solvers.single_pressure import Linear
 from asperity.ehl.models.mixed import MixedBalance
@@ -78,10 +78,10 @@ def newton(
         d_pressure, d_approach = newton_step(balance, storing=storing, fixed=fixed)
         change = float(np.mean(np.abs(d_pressure)) / mean_pressure)
         stagnation += 1
-        if balance.residual_rms < NEWTON.required_decrease * lowest:
+        if balance.residual_rms < STEP_LIMITS.required_decrease * lowest:
             lowest = balance.residual_rms
             stagnation = 0
-        elif stagnation == NEWTON.stagnation_iterations:
+        elif stagnation == STEP_LIMITS.stagnation_iterations:
             lowest, stagnation, attempt = balance.residual_rms, 0, attempt + 1
         limited = limit(d_pressure, pressure)
         pressure = np.clip(pressure + damping.share * limited, 0.0, problem.p_cap)
@@ -160,6 +160,6 @@ def _solved(product: Operator, precondition: Operator, rhs: Field) -> Field:
         product,
         precondition,
         rhs,
-        tolerance=NEWTON.linear_tolerance,
-        max_steps=NEWTON.max_krylov_steps,
+        tolerance=KRYLOV.tolerance,
+        max_steps=KRYLOV.max_steps,
     )

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import islice
 
-from asperity.ehl.controls import CONTINUATION, SEARCH
+from asperity.ehl.controls import RESIDUALS, SEARCH
 from asperity.ehl.models.mixed import Pressures
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.mixed import newton
@@ -43,9 +43,7 @@ class ExactFaceSearch(Search):
         if not coarse:
             return tolerance, max_steps
         roughly = (
-            CONTINUATION.coarse_tolerance
-            if problem.accurate or from_coarse
-            else 0.5 * SEARCH.first_order_tolerance
+            RESIDUALS.coarse_grid if problem.accurate or from_coarse else 0.5 * RESIDUALS.guess
         )
         return max(roughly, tolerance), min(SEARCH.max_error_grid_iterations, max_steps)
 
@@ -80,7 +78,7 @@ class ExactFaceSearch(Search):
         step = self.run(problem, steps, tolerance, first_limit)
         if self.converged(tolerance):
             return step
-        roughly = max(SEARCH.first_order_tolerance, tolerance)
+        roughly = max(RESIDUALS.guess, tolerance)
         steps = newton(problem, unknowns, second_order=False, shared=False)
         step = self.run(problem, steps, roughly, max_steps)
         steps = newton(problem, unknowns_of(step), second_order=True, shared=False)
@@ -102,7 +100,7 @@ def back_to_first_order(problem: Problem, step: Step) -> Step:
                 abs(load_share_of(back) - load_share_of(other)) for other in (previous, step)
             )
             if (
-                back.balance.residual_rms < SEARCH.first_order_tolerance
+                back.balance.residual_rms < RESIDUALS.guess
                 or change < SEARCH.backward_tolerance * total_change
             ):
                 break

@@ -1,21 +1,20 @@
 """Grid continuation from an initial guess on the coarsest grid, and convergence tests."""
 
-import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 
 from asperity.contact.conditions import ContactConditions
 from asperity.core.arrays import Field, Mask
 from asperity.ehl.contact_solution import ContactSolution
-from asperity.ehl.controls import CONTINUATION, ERROR_ESTIMATE
+from asperity.ehl.controls import CONTINUATION, RESIDUALS
+from asperity.ehl.grid_error import grid_error
 from asperity.ehl.grid_transfer import AnyField
 from asperity.ehl.load_shares import CENTRE, area_share, carried_share
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.single_pressure import Step, newton
 from asperity.ehl.outcome import (
-    ATTEMPTS,
     CONSERVING,
     Convergence,
     Figures,
@@ -23,6 +22,7 @@ from asperity.ehl.outcome import (
     Iteration,
     Options,
     SolveStatus,
+    Strategy,
 )
 from asperity.ehl.problem_setup import coarser_in_all_axes
 from asperity.ehl.scales import Scales
@@ -90,7 +90,7 @@ class Search:
             else:
                 max_steps = self.options.max_iterations
                 if not finest:
-                    max_steps = min(max_steps, CONTINUATION.max_coarse_iterations)
+                    max_steps = min(max_steps, CONTINUATION.max_iterations)
                 bracket = coarsest and not finest
                 step = self._solve_level(
                     problem, pressure, approach, tolerance, max_steps, bracket=bracket
@@ -103,7 +103,7 @@ class Search:
     def level_tolerance(self, *, finest: bool) -> float:
         """Return the tolerance on the finest or a coarser grid."""
         tolerance = self.options.tolerance
-        return tolerance if finest else max(CONTINUATION.coarse_tolerance, tolerance)
+        return tolerance if finest else max(RESIDUALS.coarse_grid, tolerance)
 
     def _solve_level(
         self,
@@ -121,16 +121,16 @@ class Search:
         that fails too, at fixed approach.
         """
         steps = newton(problem, pressure, approach)
-        divergence = CONTINUATION.divergence if problem.accurate else np.inf
+        divergence = RESIDUALS.divergence if problem.accurate else np.inf
         step = self.run(problem, steps, tolerance, max_steps, divergence=divergence)
         diverged = step.number < max_steps and not (self.converged(tolerance) or self.failed)
         if problem.accurate and diverged:
             pressure, approach = self.robust_start(problem, pressure, approach)
             step = self.run(problem, newton(problem, pressure, approach), tolerance, max_steps)
-        if bracket and not self.converged(CONTINUATION.failed_residual):
+        if bracket and not self.converged(RESIDUALS.near_solution):
             # the load of a capped contact is too nonlinear in the approach for Newton
             trial = self.bracket_approach(problem, pressure, approach, tolerance, from_outside=True)
-            step = trial if self.converged(CONTINUATION.failed_residual) else step
+            step = trial if self.converged(RESIDUALS.near_solution) else step
         return step
 
     def robust_start(
@@ -144,12 +144,12 @@ class Search:
         step = self.run(
             sturdy,
             newton(sturdy, pressure, approach),
-            CONTINUATION.failed_residual,
-            CONTINUATION.max_coarse_iterations,
+            RESIDUALS.near_solution,
+            CONTINUATION.max_iterations,
         )
         return (
             (step.balance.pressure, step.approach)
-            if self.converged(CONTINUATION.failed_residual)
+            if self.converged(RESIDUALS.near_solution)
             else (pressure, approach)
         )
 
@@ -171,7 +171,7 @@ class Search:
         """
         step = next(steps)
         earlier = after or step
-        largest_residual = divergence * max(earlier.balance.residual_rms, CONTINUATION.min_residual)
+        largest_residual = divergence * max(earlier.balance.residual_rms, RESIDUALS.guess)
         while True:
             self._record(problem, step)
             self.failed = step.number > 0 and not np.isfinite(step.change)
@@ -212,7 +212,7 @@ class Search:
                 problem,
                 newton(problem, pressure, approach, fixed=True),
                 tolerance,
-                min(remaining, CONTINUATION.max_fixed_iterations),
+                min(remaining, CONTINUATION.max_iterations),
                 check_load=False,
             )
             remaining -= max(step.number, 1)
@@ -229,7 +229,7 @@ class Search:
         lubricant: Lubricant | None,
         *,
         seconds: float,
-        attempt: str = ATTEMPTS[0],
+        strategy: Strategy = Strategy.COARSE_TO_FINE,
         start: ContactSolution | None = None,
     ) -> ContactSolution:
         """Return the result of the search in SI units on the surface's grid.
@@ -276,7 +276,7 @@ class Search:
                 history=tuple(self.history),
                 tolerance=self.options.tolerance,
                 seconds=seconds,
-                attempt=attempt,
+                attempt=strategy,
                 iteration_error=self.iteration_error,
                 discretisation_error=discretisation,
             ),
@@ -328,99 +328,6 @@ def on_all_lines(problem: Problem, field: AnyField, lines: int) -> AnyField:
     """Expand a field, (nx', ny'), of a reduced problem to so many lines of cells."""
     unfolded = problem.unfold(field)
     return np.repeat(unfolded, lines // unfolded.shape[1], axis=1)
-
-
-def grid_error(
-    on_grids: Sequence[Figures],
-    *,
-    smooth: bool,
-    cell: float,
-    by_first_order: Figures | None = None,
-    order: int = 2,
-) -> GridError | None:
-    """Return intervals of the key results from the last grids; None for a single grid.
-
-    A smooth solution gets Roache's grid convergence index, three times its error: the difference of
-    both grids if it is of second `order`, three times that for first order. A rough one has no such
-    order. If its values on the last two grids differ by d, they get 2.5 d in the direction of the
-    change, 1.5 d against it, and the load share 2.4 of the squared cell (`cell`, in half-widths)
-    either way: what a hundred contacts of the wide sample need to cover four times the cells
-    (`benchmarks.intervals`). A roller's edge pressure and end film get 3 d, and up to ten times
-    that where d does not shrink with refinement. d is at least a quarter of the difference between
-    the grids before, lest two grids agree by chance, and at least the change from the first-order
-    wedge to the second-order one on the finest grid; if that is known, 0.85 of all this suffices.
-    The load share, if three grids are known too, gets 2 d in the direction of the change, 0.5 d
-    against it and one squared cell. Source: P. J. Roache, J. Fluids Eng. 116 (1994) 405.
-    """
-    if len(on_grids) < 2:
-        return None
-    *before, coarse, fine = on_grids
-    zero, shift = fine.abs_difference(fine), fine.abs_difference(coarse)
-    figures_of_ends = (
-        (name, [getattr(results, name) for results in on_grids])
-        for name in ("edge_pressure", "end_film")
-    )
-    errors = {name: ends_error(values) for name, values in figures_of_ends if None not in values}
-    if before:
-        shift = shift.maximum(
-            coarse.abs_difference(before[-1]).scale(ERROR_ESTIMATE.min_difference)
-        )
-    if smooth:
-        half, lean = shift if order > 1 else shift.scale(3.0), zero
-    else:
-        half, lean = _rough_interval(on_grids, shift, cell, by_first_order)
-        lean = replace(lean, **dict.fromkeys(errors, 0.0))
-    return GridError(**asdict(replace(half, **errors)), lean=lean)
-
-
-def _rough_interval(
-    on_grids: Sequence[Figures], shift: Figures, cell: float, by_first_order: Figures | None
-) -> tuple[Figures, Figures]:
-    """Return half the width and the lean of a rough solution's intervals; see `grid_error`."""
-    coarse, fine = on_grids[-2:]
-    zero, share = fine.abs_difference(fine), 1.0
-    if by_first_order is not None:
-        shift = shift.maximum(fine.abs_difference(by_first_order))
-        share = ERROR_ESTIMATE.two_order_share
-    half = shift.scale(0.5 * share * (ERROR_ESTIMATE.forward + ERROR_ESTIMATE.backward)).add(
-        replace(zero, clr=share * ERROR_ESTIMATE.load_share_per_cell * cell**2)
-    )
-    lean = shift.scale(0.5 * share * (ERROR_ESTIMATE.forward - ERROR_ESTIMATE.backward)).copysign(
-        fine.difference(coarse)
-    )
-    if by_first_order is not None and len(on_grids) > 2:
-        half_clr, lean_clr = _load_share_error(shift.clr, fine.clr - coarse.clr, cell)
-        half, lean = replace(half, clr=half_clr), replace(lean, clr=lean_clr)
-    return half, lean
-
-
-def _load_share_error(shift: float, change: float, cell: float) -> tuple[float, float]:
-    """Return half the width and the lean of the load share's interval from three grids."""
-    half = (
-        0.5 * (ERROR_ESTIMATE.load_share_forward + ERROR_ESTIMATE.load_share_backward) * shift
-        + ERROR_ESTIMATE.load_share_per_cell_three * cell**2
-    )
-    lean = 0.5 * (ERROR_ESTIMATE.load_share_forward - ERROR_ESTIMATE.load_share_backward) * shift
-    return half, math.copysign(lean, change)
-
-
-def ends_error(on_grids: Sequence[float]) -> float:
-    """Return half the interval of a value at a roller's ends on successively finer grids.
-
-    See `grid_error`.
-    """
-    *before, coarse, fine = on_grids
-    shift, factor = abs(fine - coarse), ERROR_ESTIMATE.end_factor
-    if before:
-        earlier = abs(coarse - before[-1])
-        if shift > ERROR_ESTIMATE.end_scatter * abs(fine):
-            shrinks = min(shift / earlier, 1.0) if earlier > 0.0 else 1.0
-            factor *= min(
-                max(0.5 * shrinks / max(1.0 - shrinks, 1e-9), 1.0),
-                ERROR_ESTIMATE.max_end_growth,
-            )
-        shift = max(shift, ERROR_ESTIMATE.min_difference * earlier)
-    return factor * shift
 
 
 def figures(

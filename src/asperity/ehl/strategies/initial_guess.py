@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.core.arrays import Field
-from asperity.ehl.controls import CONTINUATION, GUESS
+from asperity.ehl.controls import GUESS, RESIDUALS
 from asperity.ehl.models.elastic_dry import elastic_contact
 from asperity.ehl.models.mixed import Pressures
 from asperity.ehl.models.plastic_dry import active_set_dry, dry_contact
@@ -49,7 +49,7 @@ def dry_start(problem: Problem, coarser: Pressures | None = None) -> tuple[Field
     approach_guess = (
         _first_contact(dry, guess) if coarser is None else coarser.approach - problem.contact_gap
     )
-    pressure, approach, converged = active_set_dry(dry, guess, approach_guess, GUESS.dry_tolerance)
+    pressure, approach, converged = active_set_dry(dry, guess, approach_guess, RESIDUALS.guess)
     if converged:
         return pressure, approach
     if coarser is not None:
@@ -68,7 +68,7 @@ def _elastic_start(dry: Problem, guess: Field) -> tuple[Field, float] | None:
     """Return pressure and approach of elastic bodies; None if they reach the cap."""
     if np.any(guess >= dry.p_cap):
         return None
-    pressure, approach, converged = elastic_contact(dry, guess, CONTINUATION.coarse_tolerance)
+    pressure, approach, converged = elastic_contact(dry, guess, RESIDUALS.coarse_grid)
     return (pressure, approach) if converged and np.all(pressure < dry.p_cap) else None
 
 
@@ -82,9 +82,9 @@ def _by_newton(dry: Problem, pressure: Field, approach: float) -> tuple[Step, bo
     """Return the result of Newton steps, and whether it suffices as an initial guess."""
     for step in newton(dry, pressure, approach):
         residual = max(step.balance.residual_rms, abs(step.balance.load_error))
-        if residual < GUESS.dry_tolerance or step.number == GUESS.max_newton_steps:
+        if residual < RESIDUALS.guess or step.number == GUESS.max_newton_steps:
             break
-    return step, residual < GUESS.dry_tolerance
+    return step, residual < RESIDUALS.guess
 
 
 def interpolate_unknowns(problem: Problem, unknowns: Pressures) -> Pressures:

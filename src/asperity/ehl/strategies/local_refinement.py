@@ -13,7 +13,7 @@ import numpy as np
 import scipy
 
 from asperity.core.arrays import Field
-from asperity.ehl.controls import REFINEMENT
+from asperity.ehl.controls import REFINEMENT, RESIDUALS
 from asperity.ehl.models.mixed import MixedBalance, Pressures, evaluate
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.mixed import newton
@@ -61,7 +61,7 @@ def _worst_boxes(balance: MixedBalance) -> list[Box]:
     residual = np.abs(balance.oil_residual)
     worst = residual > REFINEMENT.worst_residual * residual.max()
     share = float((residual[worst] ** 2).sum() / max((residual**2).sum(), np.finfo(float).tiny))
-    if balance.residual_rms < REFINEMENT.min_residual or share < REFINEMENT.min_residual_share:
+    if balance.residual_rms < RESIDUALS.coarse_grid or share < REFINEMENT.min_residual_share:
         return []
     if problem.form.periodic:
         worst = np.broadcast_to(worst.any(axis=1, keepdims=True), worst.shape)

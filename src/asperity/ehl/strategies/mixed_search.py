@@ -8,14 +8,14 @@ import numpy as np
 from asperity.contact.conditions import ContactConditions
 from asperity.core.arrays import Field
 from asperity.ehl.contact_solution import ContactSolution
-from asperity.ehl.controls import CONTINUATION, MARCHING, SEARCH
+from asperity.ehl.controls import CONTINUATION, MARCHING, RESIDUALS, SEARCH
 from asperity.ehl.models.mixed import MixedBalance, Pressures, evaluate, has_thin_film
 from asperity.ehl.models.oil_advection import uses_limiter
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.models.transient_term import TransientTerm
 from asperity.ehl.newton.mixed import newton
 from asperity.ehl.newton.single_pressure import Step
-from asperity.ehl.outcome import ATTEMPTS, FROM_DRY
+from asperity.ehl.outcome import Strategy
 from asperity.ehl.problem_setup import coarser_in_all_axes, grid_levels
 from asperity.ehl.scales import Scales
 from asperity.ehl.strategies.exact_faces import ExactFaceSearch, back_to_first_order
@@ -29,8 +29,6 @@ from asperity.ehl.strategies.local_refinement import refine_locally
 from asperity.ehl.strategies.oil_state import oil_of, unknowns_of
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface
-
-COARSE_TO_FINE, ROBUST = ATTEMPTS[:2]
 
 
 class MixedSearch(ExactFaceSearch):
@@ -56,29 +54,29 @@ class MixedSearch(ExactFaceSearch):
         lubricant: Lubricant | None,
         *,
         seconds: float,
-        attempt: str = ATTEMPTS[0],
+        strategy: Strategy = Strategy.COARSE_TO_FINE,
         start: ContactSolution | None = None,
     ) -> ContactSolution:
         """Return the result of the search with the state of the oil."""
         solution = super().solution(
-            step, surface, conditions, lubricant, seconds=seconds, attempt=attempt, start=start
+            step, surface, conditions, lubricant, seconds=seconds, strategy=strategy, start=start
         )
         scales = Scales.from_conditions(conditions, lubricant)
         return replace(solution, oil=oil_of(step, surface, scales))
 
     def solve_by(
         self,
-        strategy: str,
+        strategy: Strategy,
         levels: Sequence[Problem],
         guess: Callable[[Problem], tuple[Field, float]],
     ) -> Step:
         """Solve by one of the strategies on the first of the levels."""
         self.cell, self.by_first_order = levels[0].spacing[0], None  # not an earlier strategy's
-        if strategy == FROM_DRY:
+        if strategy == Strategy.FROM_DRY:
             return self.from_dry(levels)
         step = self.coarse_to_fine(levels, guess)
         # sharp ends need the robust strategy
-        sharp_ends = levels[0].form.roller is not None and strategy == COARSE_TO_FINE
+        sharp_ends = levels[0].form.roller is not None and strategy == Strategy.COARSE_TO_FINE
         # smooth bodies: oil and asperities never share a cell
         single_pressure_suffices = self.smooth and not sharp_ends
         if single_pressure_suffices and not self.converged(self.options.tolerance):
@@ -110,7 +108,7 @@ class MixedSearch(ExactFaceSearch):
             robust = replace(problem, exact=False)
             step = self.continue_from(robust, unknowns)
             return self.solve_again([(robust, step)])
-        max_steps = min(self.options.max_iterations, SEARCH.max_second_order_iterations)
+        max_steps = min(self.options.max_iterations, CONTINUATION.max_iterations)
         step = self.run(
             problem, newton(problem, unknowns, second_order=True), self.options.tolerance, max_steps
         )
@@ -132,8 +130,8 @@ class MixedSearch(ExactFaceSearch):
             step = self.from_refilled_cavities_directly(problem, unknowns)
             if self.converged(tolerance):
                 return step
-        roughly = max(SEARCH.first_order_tolerance, tolerance)
-        soon = min(SEARCH.max_second_order_iterations, max_steps)
+        roughly = max(RESIDUALS.guess, tolerance)
+        soon = min(CONTINUATION.max_iterations, max_steps)
         if uses_limiter(problem):
             steps = newton(problem, unknowns, second_order=True)
             step = self.run(
@@ -141,7 +139,7 @@ class MixedSearch(ExactFaceSearch):
                 steps,
                 roughly,
                 min(SEARCH.max_restart_iterations, soon),
-                divergence=SEARCH.divergence,
+                divergence=RESIDUALS.divergence,
             )
             if self.converged(roughly) and not self.converged(tolerance):
                 step = self.run(
@@ -149,7 +147,7 @@ class MixedSearch(ExactFaceSearch):
                     steps,
                     tolerance,
                     step.number + soon,
-                    divergence=SEARCH.divergence,
+                    divergence=RESIDUALS.divergence,
                     after=step,
                 )
             if self.converged(tolerance):
@@ -158,7 +156,7 @@ class MixedSearch(ExactFaceSearch):
                 return step
         return self.solve_from_afar(problem, unknowns, coarse=coarse, last=last)
 
-    def refine_third_order(self, problem: Problem, step: Step) -> tuple[str, Step]:
+    def refine_third_order(self, problem: Problem, step: Step) -> tuple[Strategy, Step]:
         """Refine a robust solution of smooth bodies with the third-order wedge.
 
         Returns strategy and step, those of the robust solution if this fails.
@@ -170,13 +168,13 @@ class MixedSearch(ExactFaceSearch):
             problem,
             newton(problem, unknowns_of(step), second_order=False),
             self.options.tolerance,
-            SEARCH.max_second_order_iterations,
+            CONTINUATION.max_iterations,
         )
         if self.converged(self.options.tolerance):
             self.figures[-1] = self.figures_of(better)
-            return COARSE_TO_FINE, better
+            return Strategy.COARSE_TO_FINE, better
         self.history, self.figures, self.iteration_error = history, figures, error
-        return ROBUST, step
+        return Strategy.SECOND_ORDER, step
 
     def solve_from_afar(
         self,
@@ -211,7 +209,7 @@ class MixedSearch(ExactFaceSearch):
         step = self._solve_first_order(
             problem, unknowns, length, min(max_steps, SEARCH.max_first_order_iterations), tolerance
         )
-        if not self.converged(CONTINUATION.failed_residual):
+        if not self.converged(RESIDUALS.near_solution):
             return step
         self.by_first_order = self.figures_of(step)
         return self.run(
@@ -222,12 +220,12 @@ class MixedSearch(ExactFaceSearch):
         self, problem: Problem, unknowns: Pressures, length: float, max_steps: int, tolerance: float
     ) -> Step:
         """Solve roughly with the first-order wedge; retry from more accurate time steps."""
-        roughly = max(SEARCH.first_order_tolerance, tolerance)
+        roughly = max(RESIDUALS.guess, tolerance)
         steps = newton(problem, unknowns, second_order=False)
-        step = self.run(problem, steps, roughly, max_steps, divergence=SEARCH.divergence)
+        step = self.run(problem, steps, roughly, max_steps, divergence=RESIDUALS.divergence)
         if self.converged(roughly):
             return step
-        step = self.march_in_time(problem, unknowns, length, tolerance=SEARCH.first_order_tolerance)
+        step = self.march_in_time(problem, unknowns, length, tolerance=RESIDUALS.guess)
         steps = newton(problem, unknowns_of(step), second_order=False)
         return self.run(problem, steps, roughly, max_steps)
 
@@ -255,7 +253,7 @@ class MixedSearch(ExactFaceSearch):
                 newton(stepped, unknowns, second_order=False),
                 tolerance,
                 max_steps,
-                divergence=SEARCH.divergence,
+                divergence=RESIDUALS.divergence,
             )
             if self.converged(tolerance):
                 unknowns = unknowns_of(step)
@@ -272,7 +270,7 @@ class MixedSearch(ExactFaceSearch):
             elif length < MARCHING.min_length * first:
                 break
             else:  # residuals of earlier steps may cause cycles: a closer tolerance
-                length, tolerance = 0.25 * length, min(tolerance, SEARCH.first_order_tolerance)
+                length, tolerance = 0.25 * length, min(tolerance, RESIDUALS.guess)
         return step
 
     def from_refilled_cavities(self, problem: Problem, unknowns: Pressures, length: float) -> Step:
@@ -289,11 +287,11 @@ class MixedSearch(ExactFaceSearch):
         """Solve for conserved oil from refilled cavities, without time steps: they close films."""
         refilled, start = _refilled(problem, unknowns)
         steps = newton(refilled, start, second_order=False)
-        roughly = CONTINUATION.coarse_tolerance
+        roughly = RESIDUALS.coarse_grid
         step = self.run(refilled, steps, roughly, SEARCH.max_restart_iterations)
         steps = newton(problem, unknowns_of(step), second_order=False)
-        limits = (self.options.tolerance, SEARCH.max_second_order_iterations)
-        return self.run(problem, steps, *limits, divergence=SEARCH.divergence)
+        limits = (self.options.tolerance, CONTINUATION.max_iterations)
+        return self.run(problem, steps, *limits, divergence=RESIDUALS.divergence)
 
     def coarse_to_fine(
         self, levels: Sequence[Problem], guess: Callable[[Problem], tuple[Field, float]]
@@ -319,10 +317,10 @@ class MixedSearch(ExactFaceSearch):
                 )
             else:
                 step = self.solve_coarse(problem, unknowns)
-            if self.smooth and not self.converged(SEARCH.smooth_coarse_residual):
+            if self.smooth and not self.converged(RESIDUALS.guess):
                 self.figures, unknowns, coarser = [], None, None
                 continue
-            if problem is not levels[0] and not self.converged(SEARCH.first_order_tolerance):
+            if problem is not levels[0] and not self.converged(RESIDUALS.guess):
                 self.figures = []  # an initial guess, but no solution to compare with
             elif coarser_in_all_axes(problem, levels[0]):
                 self.keep(problem, step)
@@ -337,16 +335,16 @@ class MixedSearch(ExactFaceSearch):
 
         Smooth bodies alternate a few steps and local refinement.
         """
-        tolerance = max(CONTINUATION.coarse_tolerance, self.options.tolerance)
+        tolerance = max(RESIDUALS.coarse_grid, self.options.tolerance)
         steps = newton(replace(problem, conserve=False), unknowns, second_order=False)
         for _ in range(SEARCH.max_smooth_turns if problem.accurate else 0):
             step = self.run(problem, steps, tolerance, SEARCH.steps_per_turn)
             if self.converged(tolerance):
                 return step
-            if step.balance.residual_rms < SEARCH.first_order_tolerance:
+            if step.balance.residual_rms < RESIDUALS.guess:
                 break
             steps = newton(problem, refine_locally(problem, unknowns_of(step)), second_order=False)
-        return self.run(problem, steps, tolerance, CONTINUATION.max_coarse_iterations)
+        return self.run(problem, steps, tolerance, CONTINUATION.max_iterations)
 
     def from_dry(self, levels: Sequence[Problem]) -> Step:
         """Solve from the dry contact, on successive grids.
@@ -365,11 +363,11 @@ class MixedSearch(ExactFaceSearch):
             else:
                 step = self.solve_from_coarse(problem, start, coarse=not finest, last=False)
             # the effect of oil on the coarser grid was no good guess
-            if coarser is not None and not self.converged(CONTINUATION.failed_residual):
+            if coarser is not None and not self.converged(RESIDUALS.near_solution):
                 step = self.solve_from_afar(
                     problem, dry, coarse=not finest, length=2.0 * problem.spacing[0]
                 )
-            if finest or self.converged(max(SEARCH.first_order_tolerance, self.options.tolerance)):
+            if finest or self.converged(max(RESIDUALS.guess, self.options.tolerance)):
                 if coarser_in_all_axes(problem, levels[0]):
                     self.keep(problem, step)
                 coarser = DryAndLubricated(dry, unknowns_of(step))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from asperity.ehl.contact_solution import ContactSolution
-from asperity.ehl.controls import CONTINUATION, MENISCUS, SEARCH
+from asperity.ehl.controls import MENISCUS, RESIDUALS, SEARCH
 from asperity.ehl.inlet_layer import InletLayer
 from asperity.ehl.models.mixed import Pressures, evaluate
 from asperity.ehl.models.single_pressure import Problem
@@ -50,8 +50,8 @@ def march_to_steady(search: MixedSearch, problem: Problem, unknowns: Pressures) 
         stepped = replace(robust, past=implicit_step(problem, length, balance.content))
         search.max_imbalance = MENISCUS.forcing * max(balance.imbalance, SEARCH.max_imbalance)
         steps = newton(stepped, balance.unknowns, second_order=False)
-        step = search.run(stepped, steps, CONTINUATION.coarse_tolerance, steps_allowed)
-        if search.converged(CONTINUATION.coarse_tolerance):
+        step = search.run(stepped, steps, RESIDUALS.coarse_grid, steps_allowed)
+        if search.converged(RESIDUALS.coarse_grid):
             balance = evaluate(robust, unknowns_of(step), second_order=False)
             length *= _growth(step.number)
             stationary = balance.imbalance < SEARCH.max_imbalance and search.converged(tolerance)
