@@ -46,20 +46,16 @@ class MixedNewton:
     state_offset: float = 1e-9  # beyond a state's bound, puts a cell into the next state
     line_search_residual: float = 0.03  # below it a step that increases the residual is halved
     max_residual_growth: float = 1.5  # of a step that is not halved
-    # in contact films: change of gap below which the next step linearises the opening of the wedge
-    settled_gap_change: float = 0.1
     # with exact face mobilities, of one step:
     max_film_decrease: float = 0.8  # in a cell's film ...
     closing_film: float = 0.5  # ... and, in a time step, this share of the rms roughness
     max_pressure_change: float = 2.0  # in a cell's pressure, or in p_h if that is more
-    remembered_residuals: int = 6  # the residual may rise to the largest of them
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MixedLinearSolver:
     """Linear solver of the mixed model's Newton steps; `KrylovMethod` has the usual tolerance."""
 
-    tolerance_smooth: float = 0.05  # for smooth bodies, whose steps are few and nearly linear
     # for exact face mobilities near the solution, whose rows differ by more; and for conserved oil
     # between bodies that touch nowhere, if their film is a small difference of far larger
     # deflections (`thin_film`, a²/R): the cavity's equations dominate the residual
@@ -70,7 +66,6 @@ class MixedLinearSolver:
     # in a time step the residual, between `tolerance_close` and this one: closer steps far from the
     # solution are not better ones
     max_tolerance_time_step: float = 0.3
-    coarse_relaxation: float = 2.0  # the coarse correction is too stiff against slow modes
     min_multigrid_cells: int = 64  # along both axes, from which multigrid replaces sparse LU
     # share of the flattened cells: fewer nearly closed ones make the contact firm
     max_nearly_closed: float = 0.1
@@ -94,8 +89,7 @@ class KrylovMethod:
     tolerance: float = 0.1  # relative residual: an inexact Newton method
     max_steps: int = 60
     initial_vectors: int = 7  # allocated at first
-    reorthogonalise: float = 0.5  # share of a vector left, below which it is orthogonalised again
-    reorthogonalise_shifted: float = 0.1  # the same, where all vectors stay in single precision
+    reorthogonalise: float = 0.1  # share of a vector left, below which it is orthogonalised again
     stagnation: float = 0.9  # residual ratio of a step above which the basis vector continues
 
 
@@ -121,11 +115,7 @@ class ElasticDry:
     max_active_sets: int = 30  # in one window
     max_windows: int = 8
     window_margin: int = 32  # a window adds one in so many of all lines on either side
-    loose: float = 0.1  # relative residual of conjugate gradients while the active set changes
-    tight: float = 1e-3  # ... once it is stable
-    exact: float = 1e-4  # ... close to the solution
-    changing_share: float = 0.002  # of touching cells: the active set changes
-    final_residual: float = 1e-6  # below it the solution is close
+    tolerance: float = 1e-3  # relative residual of conjugate gradients once the set is stable
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,17 +125,6 @@ class PlasticDry:
     tolerance: float = 1e-4  # residual of projected conjugate gradients
     max_steps: int = 300  # of projected conjugate gradients
     max_load_corrections: int = 40  # rounds that redistribute load cut off by the bounds
-    max_active_sets: int = 16
-    linear_tolerance: float = 0.3  # relative residual of conjugate gradients in an active set
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class InitialGuess:
-    """Dry contact as an initial guess."""
-
-    first_asperities: float = 2.0  # height of the first touching asperities, in rms roughness
-    max_gradient_steps: int = 60  # of projected conjugate gradients ...
-    max_newton_steps: int = 20  # ... and then of Newton's method
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -165,7 +144,8 @@ class LocalRefinement:
 class GridContinuation:
     """Search from the coarsest grid to the finest."""
 
-    # on a coarser grid, at one approach while it is bracketed, or of the second-order wedge
+    # where another way is left: on a coarser grid, at one approach while it is bracketed, of the
+    # second-order wedge, of a roller's third-order wedge, in a time step
     max_iterations: int = 40
     elastic_tolerance: float = 0.1  # of dry elastic bodies, in that of the Newton step after it
     min_coarse_inlet_cells: float = 2.0  # across the inlet of a line contact: else it closes
@@ -176,21 +156,19 @@ class GridContinuation:
 class MixedSearchControls:
     """Strategies of the mixed model."""
 
-    max_roller_iterations: int = 60  # third-order, on the finest grid: sharp ends take another way
     max_roller_work: float = 1.25  # all steps on all grids, in the allowed work on the finest one
-    max_error_grid_iterations: int = 60  # on a coarser grid that only estimates the error
-    max_first_order_iterations: int = 80
-    max_backward_iterations: int = 20  # from second order back to first, for the error estimate ...
-    backward_tolerance: float = 0.2  # ... until a step moves the load share by less of its change
-    max_restart_iterations: int = 12  # second order from a coarser grid to `Residuals.guess`
+    # of the first-order wedge from a distant guess, and of exact face mobilities from arithmetic
+    # means
+    max_long_iterations: int = 80
+    # back to first order, for the error estimate, until a step moves the load share by less of its
+    # change
+    backward_tolerance: float = 0.2
     # sum of gains and losses over the throughflow, if conserving ...
     max_imbalance: float = 1e-6
     imbalance_to_tolerance: float = 1e-2  # ... or this share of the tolerance, if that is more
     rounding: float = 1e-12  # residual that is rounding: in a wide inlet it is much oil
     max_smooth_turns: int = 4  # of Newton and local refinement for smooth bodies on a coarse grid
     steps_per_turn: int = 2
-    max_exact_iterations: int = 80  # with exact face mobilities, from arithmetic means ...
-    max_time_step_iterations: int = 30  # ... or from the time step before
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -198,7 +176,7 @@ class TimeMarching:
     """Implicit time steps towards a steady state; lengths are the oil's path in one step."""
 
     tolerance: float = 5e-2  # of one step
-    max_newton_steps: int = 10  # in one step
+    max_newton_steps: int = 10  # in one step, or to restart from a coarser grid
     max_steps: int = 60
     final_length: float = 3.0  # half-widths; the last step is at least as long
     min_length: float = 0.05  # in the first step: shorter ones do not help
@@ -238,7 +216,6 @@ KRYLOV = KrylovMethod()
 OSCILLATION = Oscillation()
 ELASTIC_DRY = ElasticDry()
 PLASTIC_DRY = PlasticDry()
-GUESS = InitialGuess()
 REFINEMENT = LocalRefinement()
 CONTINUATION = GridContinuation()
 SEARCH = MixedSearchControls()

@@ -242,7 +242,7 @@ class Shifted:
             vector = self.times(-1.0, basis, overlaps, beta=1.0, y=vector, overwrite_y=True)
             column += overlaps
             length = _norm(vector)
-            if length >= KRYLOV.reorthogonalise_shifted * initial_length:
+            if length >= KRYLOV.reorthogonalise * initial_length:
                 break
         else:
             length = _norm(vector)

@@ -17,7 +17,6 @@ import numpy as np
 
 from asperity.core.arrays import Field, Mask
 from asperity.ehl.controls import KRYLOV, MIXED_SOLVER, RESIDUALS, STEP_LIMITS
-from asperity.ehl.grid_transfer import Index
 from asperity.ehl.linear_solvers.gmres import Workspace, gmres
 from asperity.ehl.linear_solvers.single_pressure import (
     BlockSolver,
@@ -33,7 +32,6 @@ from asperity.ehl.models.mixed import (
     Pressures,
     has_thin_film,
     limiter_slopes,
-    opening_slopes,
 )
 from asperity.ehl.models.oil_advection import (
     OPENING_RANGE,
@@ -60,7 +58,6 @@ class MixedLinear:
         self,
         balance: MixedBalance,
         dtype: Precision = np.float32,
-        settled: Mask | None = None,
         *,
         with_limiter: bool = False,
     ) -> None:
@@ -79,7 +76,7 @@ class MixedLinear:
         self.scale = np.where(self.lubricated, self.rows.fluid_scale, self.real(0.0))
         self.full_film = Film(*(part.astype(self.real) for part in balance.film))
         self.faces = single_faces(balance.faces, dtype)
-        self.lagrangian, self.settled = is_lagrangian(problem), settled
+        self.lagrangian = is_lagrangian(problem)
         self.film = self.full_film.without_wedge if self.lagrangian else self.full_film
         self.with_limiter = with_limiter and self.limiter is not None
 
@@ -93,13 +90,6 @@ class MixedLinear:
         """Derivatives of the limited correction in the own and in the upstream content."""
         limited = np.any(self.balance.limiter)
         return limiter_slopes(self.balance, self.real) if limited else None
-
-    @cached_property
-    def opening(self) -> tuple[Index, Index, Field] | None:
-        """Faces, cells and slopes of the opening of the wedge."""
-        if self.limiter is None or self.settled is None or self.lagrangian:
-            return None
-        return opening_slopes(self.balance, self.settled)
 
     @cached_property
     def storage(self) -> StoredOil | None:
@@ -211,18 +201,7 @@ class MixedLinear:
         correction = self._content_outflow(d_oil, d_gap, d_height)
         if correction is not None:
             wet += correction * self.scale
-        self._add_opening(d_gap, wet)
         return wet, d_gap * self.real(self.rows.contact_scale)
-
-    def _add_opening(self, d_gap: Field, wet: Field) -> None:
-        """Add the outflow due to the opening of the wedge, in place."""
-        if self.opening is None:
-            return
-        faces, cells, slopes = self.opening
-        through = (slopes / self.balance.problem.spacing[0]).astype(self.real)
-        through = through * d_gap.ravel()[cells]
-        for row, sign in ((faces, 1.0), (faces + self.cells[1], -1.0)):
-            np.add.at(wet.ravel(), row, self.real(sign) * through * self.scale.ravel()[row])
 
     def _content_outflow(self, d_oil: Field, d_gap: Field, d_height: Field) -> Field | None:
         """Return the outflow due to surplus or to the second order of the wedge; None without."""
@@ -246,10 +225,7 @@ class MixedLinear:
     def precondition(self, wet: Field) -> Field:
         """Return an approximate change of the oil's pressure for a residual of its rows."""
         blocks, lines = self.inverse
-        change = blocks(wet)
-        if self.follows_wedge:
-            change *= self.real(MIXED_SOLVER.coarse_relaxation)
-        return lines(wet, change)
+        return lines(wet, blocks(wet))
 
     def total(self, d_oil: Field, d_closed: Field) -> Field:
         """Return the change of total pressure.
@@ -382,9 +358,7 @@ def extend_lubrication(balance: MixedBalance) -> MixedBalance:
 def is_firm(balance: MixedBalance) -> bool:
     """Return True if few cells are nearly closed, compared with flattened ones.
 
-    Many nearly closed cells mean films of about the contact film that open and close from step to
-    step. The opening slopes of one step then say little about the next, and coarse blocks of unlike
-    cells precondition badly.
+    Otherwise coarse blocks of unlike cells precondition badly.
     """
     gap, film = balance.gap, balance.problem.contact_gap
     nearly = (gap > (1.0 + CLOSED_WITHIN) * film) & (gap < (1.0 + OPENING_RANGE) * film)
@@ -392,19 +366,18 @@ def is_firm(balance: MixedBalance) -> bool:
 
 
 def newton_step(
-    balance: MixedBalance, settled: Mask | None = None, workspace: Workspace | None = None
+    balance: MixedBalance, workspace: Workspace | None = None, *, extended: bool = False
 ) -> Pressures:
     """Return changes of all unknowns that solve the linearised equations and the load to a tenth.
 
-    The opening of the wedge is linearised in `settled` cells if the contact is firm, and oil is
-    extended along flattened cells; both require `settled`. Steps on one grid may share a GMRES
-    `workspace`.
+    If `extended`, oil is extended along flattened cells of a steady contact. Steps on one grid may
+    share a GMRES `workspace`.
     """
     problem = balance.problem
     steady = not problem.conserve and problem.past is None and problem.fixed is None
-    if settled is not None and steady:
+    if extended and steady:
         balance = extend_lubrication(balance)
-    linear = MixedLinear(balance, settled=settled if steady and is_firm(balance) else None)
+    linear = MixedLinear(balance)
     known_oil, known_total = _known_changes(linear)
     step = _Step(linear)
     missing = step.load_missing(known_total)
@@ -447,4 +420,4 @@ def _linear_tolerance(linear: MixedLinear) -> float:
         return min(max(least, residual), largest)
     if balance.problem.exact and residual < RESIDUALS.near_solution:
         return MIXED_SOLVER.tolerance_close
-    return MIXED_SOLVER.tolerance_smooth if linear.follows_wedge else KRYLOV.tolerance
+    return KRYLOV.tolerance

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.core.arrays import Field, Mask
-from asperity.ehl.controls import ELASTIC_DRY
+from asperity.ehl.controls import ELASTIC_DRY, KRYLOV
 from asperity.ehl.deflection import Deflection
 from asperity.ehl.models.single_pressure import Problem
 
@@ -98,14 +98,8 @@ def _solve_window(
         if np.any(settled != pressure):
             settled[touching] += (lines.load - settled.sum()) / count
             gap = lines.undeformed + lines.deflection(settled)
-        changing = np.count_nonzero(touching != previous) > ELASTIC_DRY.changing_share * count
-        reduction = (
-            ELASTIC_DRY.loose
-            if changing
-            else ELASTIC_DRY.tight
-            if residual > ELASTIC_DRY.final_residual
-            else ELASTIC_DRY.exact
-        )
+        changing = np.any(touching != previous)
+        reduction = KRYLOV.tolerance if changing else ELASTIC_DRY.tolerance
         reduction = max(reduction, 0.2 * tolerance / residual)
         change, _, inner = level_gaps(lines.deflection, touching, gap, reduction, max_steps - steps)
         pressure, previous, steps = settled + change, touching, steps + inner

@@ -29,9 +29,7 @@ import numpy as np
 
 from asperity.core.arrays import Codes, Field, Mask
 from asperity.ehl.controls import MIXED_SOLVER
-from asperity.ehl.grid_transfer import Index
 from asperity.ehl.models.oil_advection import (
-    OPENING_RANGE,
     advected_outflow,
     limiter_outflow,
     outflow_by_content,
@@ -382,7 +380,7 @@ def has_thin_film(balance: MixedBalance) -> bool:
 def limiter_slopes(balance: MixedBalance, dtype: Precision) -> tuple[Field, Field]:
     """Return derivatives of the limited correction in the own and, negative, the upstream content.
 
-    The opening of cells is held constant; see `opening_slopes`. Both have shape (nx, ny).
+    The opening of cells is held constant. Both have shape (nx, ny).
     """
     content = balance.film.content
     by_own, by_upstream = np.empty((2, *content.shape), dtype)
@@ -390,28 +388,6 @@ def limiter_slopes(balance: MixedBalance, dtype: Precision) -> tuple[Field, Fiel
         balance.limiter, content, upstream_content(balance.problem, content), by_own, by_upstream
     )
     return by_own, by_upstream
-
-
-def opening_slopes(balance: MixedBalance, moved: Mask) -> tuple[Index, Index, Field]:
-    """Return derivatives of the limited correction at eastern faces in the gap of opening cells.
-
-    Returns faces, cells and slopes of the `moved` cells, faces and cells as flat indices: a cell
-    once for its own face and once for the next one downstream.
-    """
-    problem, (_, ny) = balance.problem, balance.problem.cells
-    gap, content, closed = balance.gap, balance.film.content.ravel(), problem.contact_gap
-    cells = np.flatnonzero(moved & (gap > closed) & (gap < (1.0 + OPENING_RANGE) * closed))
-    faces = np.concatenate([cells, cells + ny])
-    inner = (faces >= ny) & (faces < content.size - ny)
-    faces, cells = faces[inner], np.tile(cells, 2)[inner]
-    centre, upstream = content[faces], content[faces - ny]
-    other = np.clip(
-        (gap.ravel()[np.where(faces == cells, faces - ny, faces)] / closed - 1.0) / OPENING_RANGE,
-        0.0,
-        1.0,
-    )
-    leaning = upstream * centre / (upstream**2 + centre**2) * (centre - upstream)
-    return faces, cells, leaning * other / (OPENING_RANGE * closed)
 
 
 class ConservedOil(NamedTuple):

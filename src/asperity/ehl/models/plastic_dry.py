@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.core.arrays import Field, Mask
-from asperity.ehl.controls import KRYLOV, PLASTIC_DRY, STEP_LIMITS
+from asperity.ehl.controls import ELASTIC_DRY, KRYLOV, PLASTIC_DRY, STEP_LIMITS
 from asperity.ehl.deflection import Deflection
 from asperity.ehl.models.elastic_dry import level_gaps
 from asperity.ehl.models.single_pressure import Problem
@@ -50,7 +50,7 @@ class _Sets(NamedTuple):
         bound[free] += np.float32((self.load - bound.sum(dtype=float)) / np.count_nonzero(free))
         gap = self.undeformed + self.deflection(bound)
         change, level, _ = level_gaps(
-            self.deflection, free, gap, PLASTIC_DRY.linear_tolerance, KRYLOV.max_steps
+            self.deflection, free, gap, KRYLOV.tolerance, KRYLOV.max_steps
         )
         return np.clip(bound + change.astype(np.float32), zero, self.cap), level
 
@@ -66,14 +66,14 @@ def active_set_dry(
     inside, cap = sets.inside, sets.cap
     furthest = STEP_LIMITS.max_approach_step * max(1.0, float(np.std(problem.roughness)))
     pressure = np.where(inside, np.clip(pressure, 0.0, cap), 0.0).astype(np.float32)
-    for number in range(PLASTIC_DRY.max_active_sets + 1):
+    for number in range(ELASTIC_DRY.max_active_sets + 1):
         gap = sets.undeformed + sets.deflection(pressure) + np.float32(approach)
         touching = gap * sets.stiffness
         load_missing = abs(float(pressure.sum(dtype=float)) / sets.load - 1.0)
         converged = max(_residual(pressure, touching, cap, inside), load_missing) < tolerance
         capped = inside & (pressure - cap > touching)
         free = inside & (pressure > touching) & ~capped
-        if converged or number == PLASTIC_DRY.max_active_sets or not free.any():
+        if converged or number == ELASTIC_DRY.max_active_sets or not free.any():
             break
         pressure, level = sets.solve_free(pressure, capped, free)
         approach += float(np.clip(-level - approach, -furthest, furthest))

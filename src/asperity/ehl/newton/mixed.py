@@ -21,26 +21,32 @@ from asperity.kernels.reynolds import CAPPED
 
 
 class _StepProposal(NamedTuple):
-    """A balance, limited changes of all unknowns from it, and the damping factor."""
+    """A balance, limited changes of all unknowns from it, and their share that is taken."""
 
     balance: MixedBalance
     step: Pressures
-    factor: float
+    share: float
+
+    def evaluated(self, damping: float = 1.0, *, second_order: bool) -> MixedBalance:
+        """Return the balance after a damped step."""
+        unknowns, freed = self.apply(damping)
+        problem = self.balance.problem
+        return evaluate(problem, unknowns, second_order=second_order, freed=freed)
 
     def apply(self, damping: float = 1.0) -> tuple[Pressures, Mask]:
         """Return the unknowns after a damped step, and the cells that then count as free."""
         problem = self.balance.problem
         (_, total, approach) = self.balance.unknowns
-        factor = damping * self.factor
+        share = damping * self.share
         free = self.balance.solid == FREE
-        signed = _updated_oil(self.balance, factor * self.step.oil)
+        signed = _updated_oil(self.balance, share * self.step.oil)
         oil = np.clip(signed, 0.0, problem.p_cap)
-        total = np.where(free, oil, np.clip(total + factor * self.step.total, 0.0, problem.p_cap))
+        total = np.where(free, oil, np.clip(total + share * self.step.total, 0.0, problem.p_cap))
         overloaded = ~free & (oil > total)
         # a cell in deep overlap would alternate between closed and free
         freed = overloaded & (self.balance.solid != CAPPED)
         unknowns = Pressures(
-            np.where(overloaded, total, signed), total, approach + factor * self.step.approach
+            np.where(overloaded, total, signed), total, approach + share * self.step.approach
         )
         return unknowns, freed
 
@@ -50,8 +56,8 @@ def newton(
 ) -> Iterator[Step]:
     """Yield the initial guess and then the result of each Newton step.
 
-    After a stagnation the Jacobian omits two terms that may cause cycles: ruptured cells downstream
-    of a lubricated one, and the change of the slope limiter with the gap.
+    After a stagnation the Jacobian omits a term that may cause cycles: ruptured cells downstream of
+    a lubricated one.
 
     A closed cell whose oil pressure would exceed the total takes the total as its oil pressure and
     is free in the next step: the oil separates the bodies. Cells at the cap are exempt.
@@ -66,13 +72,11 @@ def newton(
     balance = evaluate(problem, unknowns, second_order=second_order)
     limits = _StepLimits(problem, unknowns, float(balance.gap.min()))
     watch, workspace = _ResidualWatch(), Workspace()
-    settled_cells = np.zeros(problem.cells, dtype=bool)
     for number in count():
         approach = balance.unknowns.approach
-        gap = balance.gap
         yield Step(number, balance, approach, change)
         try:
-            step = newton_step(balance, None if watch.stagnated else settled_cells, workspace)
+            step = newton_step(balance, workspace, extended=not watch.stagnated)
         except SingularFactor:  # diverged
             yield Step(number + 1, balance, approach, np.inf)
             return
@@ -84,16 +88,13 @@ def newton(
         else:
             proposal = _StepProposal(balance, limits(step, balance), watch.damping)
             balance = _line_search(proposal, second_order=second_order)
-        settled_cells = (
-            np.abs(balance.gap - gap) < MIXED_NEWTON.settled_gap_change * problem.contact_gap
-        )
 
 
 class _ResidualWatch:
     """Residuals of the last steps; the damping changes after steps without a decrease."""
 
     def __init__(self) -> None:
-        self.last: deque[float] = deque(maxlen=MIXED_NEWTON.remembered_residuals)
+        self.last: deque[float] = deque(maxlen=STEP_LIMITS.stagnation_iterations)
         self.lowest, self.steps, self.damping, self.stagnated = np.inf, 0, 1.0, False
 
     def add(self, residual: float) -> None:
@@ -132,12 +133,9 @@ class _StepLimits:
 
 def _line_search(proposal: _StepProposal, *, second_order: bool) -> MixedBalance:
     """Halve a step that increases the residual near the solution: thin films may alternate."""
-    problem = proposal.balance.problem
-    residual = proposal.balance.residual_rms
-    damping = 1.0
+    residual, damping = proposal.balance.residual_rms, 1.0
     while True:
-        unknowns, freed = proposal.apply(damping)
-        balance = evaluate(problem, unknowns, second_order=second_order, freed=freed)
+        balance = proposal.evaluated(damping, second_order=second_order)
         if (
             residual >= MIXED_NEWTON.line_search_residual
             or balance.residual_rms <= MIXED_NEWTON.max_residual_growth * residual
@@ -175,13 +173,12 @@ def _search_below(
     Near the solution the whole step is taken, unless steps stagnated: a cell that closes passes a
     higher residual.
     """
-    problem, bound = proposal.balance.problem, max(watch.last)
+    bound = max(watch.last)
     whole = watch.last[-1] < RESIDUALS.near_solution and not watch.stagnated
     least = 1.0 if whole else STEP_LIMITS.min_damping
     damping, best = 1.0, None
     while True:
-        unknowns, freed = proposal.apply(damping)
-        balance = evaluate(problem, unknowns, second_order=second_order, freed=freed)
+        balance = proposal.evaluated(damping, second_order=second_order)
         if best is None or balance.residual_rms < best.residual_rms:
             best = balance
         if balance.residual_rms < bound or damping <= least:

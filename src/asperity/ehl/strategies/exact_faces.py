@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import islice
 
-from asperity.ehl.controls import RESIDUALS, SEARCH
+from asperity.ehl.controls import CONTINUATION, RESIDUALS, SEARCH
 from asperity.ehl.models.mixed import Pressures
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.mixed import newton
@@ -45,7 +45,7 @@ class ExactFaceSearch(Search):
         roughly = (
             RESIDUALS.coarse_grid if problem.accurate or from_coarse else 0.5 * RESIDUALS.guess
         )
-        return max(roughly, tolerance), min(SEARCH.max_error_grid_iterations, max_steps)
+        return max(roughly, tolerance), min(CONTINUATION.max_iterations, max_steps)
 
     def solve_again(self, solved: Sequence[tuple[Problem, Step]]) -> Step:
         """Solve the contact again on exact faces, on every grid that is `solved`, coarse to fine.
@@ -71,9 +71,9 @@ class ExactFaceSearch(Search):
 
     def solve_exact(self, problem: Problem, unknowns: Pressures, tolerance: float) -> Step:
         """Solve by shared steps on the second-order wedge, or by cell through the first order."""
-        max_steps = min(SEARCH.max_exact_iterations, self.options.max_iterations)
+        max_steps = min(SEARCH.max_long_iterations, self.options.max_iterations)
         steady = problem.past is None
-        first_limit = max_steps if steady else min(SEARCH.max_time_step_iterations, max_steps)
+        first_limit = max_steps if steady else min(CONTINUATION.max_iterations, max_steps)
         steps = newton(problem, unknowns, second_order=True)
         step = self.run(problem, steps, tolerance, first_limit)
         if self.converged(tolerance):
@@ -93,7 +93,7 @@ def back_to_first_order(problem: Problem, step: Step) -> Step:
     previous = back = step
     for back in islice(
         newton(problem, unknowns_of(step), second_order=False),
-        SEARCH.max_backward_iterations + 1,
+        CONTINUATION.max_iterations + 1,
     ):
         if back.number > 0:
             change, total_change = (

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.core.arrays import Field
-from asperity.ehl.controls import GUESS, RESIDUALS
+from asperity.ehl.controls import CONTINUATION, RESIDUALS
 from asperity.ehl.models.elastic_dry import elastic_contact
 from asperity.ehl.models.mixed import Pressures
 from asperity.ehl.models.plastic_dry import active_set_dry, dry_contact
@@ -56,7 +56,7 @@ def dry_start(problem: Problem, coarser: Pressures | None = None) -> tuple[Field
         step, converged = _by_newton(dry, guess, approach_guess)
         if converged:
             return step.balance.pressure, step.approach
-    pressure, approach, converged = dry_contact(dry, hertz, max_steps=GUESS.max_gradient_steps)
+    pressure, approach, converged = dry_contact(dry, hertz, max_steps=CONTINUATION.max_iterations)
     if not converged:
         step, _ = _by_newton(dry, pressure, approach)
         pressure = step.balance.pressure
@@ -73,16 +73,16 @@ def _elastic_start(dry: Problem, guess: Field) -> tuple[Field, float] | None:
 
 
 def _first_contact(dry: Problem, pressure: Field) -> float:
-    """Return the approach at which only high asperities touch, at the smooth bodies' pressure."""
+    """Return the approach at which the smooth bodies touch under this pressure."""
     smooth = dry.form.gap(dry.x, dry.y) + dry.deflection(pressure)
-    return GUESS.first_asperities * float(np.std(dry.roughness)) - float(smooth.min())
+    return -float(smooth.min())
 
 
 def _by_newton(dry: Problem, pressure: Field, approach: float) -> tuple[Step, bool]:
     """Return the result of Newton steps, and whether it suffices as an initial guess."""
     for step in newton(dry, pressure, approach):
         residual = max(step.balance.residual_rms, abs(step.balance.load_error))
-        if residual < RESIDUALS.guess or step.number == GUESS.max_newton_steps:
+        if residual < RESIDUALS.guess or step.number == CONTINUATION.max_iterations:
             break
     return step, residual < RESIDUALS.guess
 

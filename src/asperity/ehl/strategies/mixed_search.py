@@ -138,7 +138,7 @@ class MixedSearch(ExactFaceSearch):
                 problem,
                 steps,
                 roughly,
-                min(SEARCH.max_restart_iterations, soon),
+                min(MARCHING.max_newton_steps, soon),
                 divergence=RESIDUALS.divergence,
             )
             if self.converged(roughly) and not self.converged(tolerance):
@@ -201,13 +201,13 @@ class MixedSearch(ExactFaceSearch):
                 step = self.from_refilled_cavities(problem, unknowns, length)
             unknowns = unknowns_of(step) if self.converged(MARCHING.tolerance) else unknowns
         if problem.accurate and problem.form.roller is not None:
-            max_steps = min(max_steps, SEARCH.max_roller_iterations)
+            max_steps = min(max_steps, CONTINUATION.max_iterations)
         if not uses_limiter(problem):
             return self.run(
                 problem, newton(problem, unknowns, second_order=False), tolerance, max_steps
             )
         step = self._solve_first_order(
-            problem, unknowns, length, min(max_steps, SEARCH.max_first_order_iterations), tolerance
+            problem, unknowns, length, min(max_steps, SEARCH.max_long_iterations), tolerance
         )
         if not self.converged(RESIDUALS.near_solution):
             return step
@@ -288,7 +288,7 @@ class MixedSearch(ExactFaceSearch):
         refilled, start = _refilled(problem, unknowns)
         steps = newton(refilled, start, second_order=False)
         roughly = RESIDUALS.coarse_grid
-        step = self.run(refilled, steps, roughly, SEARCH.max_restart_iterations)
+        step = self.run(refilled, steps, roughly, MARCHING.max_newton_steps)
         steps = newton(problem, unknowns_of(step), second_order=False)
         limits = (self.options.tolerance, CONTINUATION.max_iterations)
         return self.run(problem, steps, *limits, divergence=RESIDUALS.divergence)
@@ -394,7 +394,7 @@ class MixedSearch(ExactFaceSearch):
         if not np.any(levels[1].form.hertz(levels[1].x, levels[1].y)):
             return  # no dry contact on such cells
         coarse_search = MixedSearch(
-            replace(self.options, max_iterations=SEARCH.max_error_grid_iterations),
+            replace(self.options, max_iterations=CONTINUATION.max_iterations),
             self.gap_scale,
             self.progress,
         )
