@@ -25,9 +25,7 @@ class StepLimits:
     max_relative_step: float = 0.5  # ... or in its own pressure: elastic asperities reach 100 p_h
     # in a²/R or rms roughness, whichever is more: a contact at the cap responds nonlinearly
     max_approach_step: float = 0.3
-    approach_growth: float = 1.2  # of the approach limit from step to step without reversal
     stagnation_iterations: int = 8  # without a decrease, until the damping changes
-    required_decrease: float = 0.9  # of the lowest residual, to count as a decrease
     min_damping: float = 1.0 / 16.0  # a line search stops there
 
 
@@ -89,7 +87,7 @@ class KrylovMethod:
     tolerance: float = 0.1  # relative residual: an inexact Newton method
     max_steps: int = 60
     initial_vectors: int = 7  # allocated at first
-    reorthogonalise: float = 0.1  # share of a vector left, below which it is orthogonalised again
+    reorthogonalise: float = 0.5  # share of a vector left, below which it is orthogonalised again
     stagnation: float = 0.9  # residual ratio of a step above which the basis vector continues
 
 
@@ -131,13 +129,10 @@ class PlasticDry:
 class LocalRefinement:
     """Nonlinear elimination of the worst cells of an initial guess."""
 
-    worst_residual: float = 0.05  # in the largest residual: cells that belong to a box ...
-    min_residual_share: float = 0.5  # ... if they hold this share of the sum of squares
+    worst_residual: float = 0.05  # in the largest residual: cells that belong to a box
     max_box_share: float = 0.25  # of the grid's cells: larger boxes do not pay
     margin: int = 6  # cells around the worst ones in a box ...
     fixed_margin: int = 2  # ... of which the outer ones are fixed
-    target: float = 0.03  # ratio of the box's residual to its initial one
-    max_steps: int = 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -149,7 +144,6 @@ class GridContinuation:
     max_iterations: int = 40
     elastic_tolerance: float = 0.1  # of dry elastic bodies, in that of the Newton step after it
     min_coarse_inlet_cells: float = 2.0  # across the inlet of a line contact: else it closes
-    separating_film_ratio: float = 1.5  # minimum film over Sq, from which oil separates the bodies
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -167,8 +161,6 @@ class MixedSearchControls:
     max_imbalance: float = 1e-6
     imbalance_to_tolerance: float = 1e-2  # ... or this share of the tolerance, if that is more
     rounding: float = 1e-12  # residual that is rounding: in a wide inlet it is much oil
-    max_smooth_turns: int = 4  # of Newton and local refinement for smooth bodies on a coarse grid
-    steps_per_turn: int = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -176,11 +168,10 @@ class TimeMarching:
     """Implicit time steps towards a steady state; lengths are the oil's path in one step."""
 
     tolerance: float = 5e-2  # of one step
-    max_newton_steps: int = 10  # in one step, or to restart from a coarser grid
+    max_newton_steps: int = 10  # in one step
     max_steps: int = 60
     final_length: float = 3.0  # half-widths; the last step is at least as long
     min_length: float = 0.05  # in the first step: shorter ones do not help
-    growth: float = 10.0  # after a long step that converged at once
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -149,7 +149,7 @@ def usable_levels(
     if not finest.form.periodic or lubricant is None:
         return levels
     gap = Scales.from_conditions(conditions, lubricant).gap
-    separation = CONTINUATION.separating_film_ratio * float(np.std(finest.roughness)) * gap
+    separation = float(np.std(finest.roughness)) * gap
     if not finest.uniform and least_film(conditions, lubricant) < separation:
         return levels
     limit = (

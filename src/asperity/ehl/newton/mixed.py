@@ -100,7 +100,7 @@ class _ResidualWatch:
     def add(self, residual: float) -> None:
         """Add the residual of a step."""
         self.steps += 1
-        if residual < STEP_LIMITS.required_decrease * self.lowest:
+        if residual < self.lowest:
             self.lowest, self.steps = residual, 0
         elif self.steps == STEP_LIMITS.stagnation_iterations:
             self.lowest, self.steps, self.damping = residual, 0, 1.5 - self.damping

@@ -78,7 +78,7 @@ def newton(
         d_pressure, d_approach = newton_step(balance, storing=storing, fixed=fixed)
         change = float(np.mean(np.abs(d_pressure)) / mean_pressure)
         stagnation += 1
-        if balance.residual_rms < STEP_LIMITS.required_decrease * lowest:
+        if balance.residual_rms < lowest:
             lowest = balance.residual_rms
             stagnation = 0
         elif stagnation == STEP_LIMITS.stagnation_iterations:

@@ -162,15 +162,13 @@ class Search:
         *,
         check_load: bool = True,
         divergence: float = np.inf,
-        after: Step | None = None,
     ) -> Step:
         """Take steps until they meet the tolerance or reach the number `max_steps`.
 
-        They also end where the residual reaches `divergence` times that of the first step, or of
-        the step `after` which they continue.
+        They also end where the residual reaches `divergence` times that of the first step.
         """
         step = next(steps)
-        earlier = after or step
+        earlier = step
         largest_residual = divergence * max(earlier.balance.residual_rms, RESIDUALS.guess)
         while True:
             self._record(problem, step)

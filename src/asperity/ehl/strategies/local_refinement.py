@@ -13,7 +13,7 @@ import numpy as np
 import scipy
 
 from asperity.core.arrays import Field
-from asperity.ehl.controls import REFINEMENT, RESIDUALS
+from asperity.ehl.controls import MARCHING, REFINEMENT, RESIDUALS
 from asperity.ehl.models.mixed import MixedBalance, Pressures, evaluate
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.mixed import newton
@@ -47,8 +47,8 @@ def _solved(problem: Problem, start: Pressures) -> tuple[Field, Field]:
             least = residual
             best = step.balance.unknowns
         if (
-            least < REFINEMENT.target * first
-            or step.number == REFINEMENT.max_steps
+            least < RESIDUALS.near_solution * first
+            or step.number == MARCHING.max_newton_steps
             or not np.isfinite(residual)
         ):
             break
@@ -60,8 +60,7 @@ def _worst_boxes(balance: MixedBalance) -> list[Box]:
     problem = balance.problem
     residual = np.abs(balance.oil_residual)
     worst = residual > REFINEMENT.worst_residual * residual.max()
-    share = float((residual[worst] ** 2).sum() / max((residual**2).sum(), np.finfo(float).tiny))
-    if balance.residual_rms < RESIDUALS.coarse_grid or share < REFINEMENT.min_residual_share:
+    if balance.residual_rms < RESIDUALS.coarse_grid:
         return []
     if problem.form.periodic:
         worst = np.broadcast_to(worst.any(axis=1, keepdims=True), worst.shape)

@@ -25,7 +25,6 @@ from asperity.ehl.strategies.initial_guess import (
     level_guess,
     roller_start,
 )
-from asperity.ehl.strategies.local_refinement import refine_locally
 from asperity.ehl.strategies.oil_state import oil_of, unknowns_of
 from asperity.lubricant import Lubricant
 from asperity.surface import Surface
@@ -130,26 +129,14 @@ class MixedSearch(ExactFaceSearch):
             step = self.from_refilled_cavities_directly(problem, unknowns)
             if self.converged(tolerance):
                 return step
-        roughly = max(RESIDUALS.guess, tolerance)
-        soon = min(CONTINUATION.max_iterations, max_steps)
         if uses_limiter(problem):
-            steps = newton(problem, unknowns, second_order=True)
             step = self.run(
                 problem,
-                steps,
-                roughly,
-                min(MARCHING.max_newton_steps, soon),
+                newton(problem, unknowns, second_order=True),
+                tolerance,
+                min(CONTINUATION.max_iterations, max_steps),
                 divergence=RESIDUALS.divergence,
             )
-            if self.converged(roughly) and not self.converged(tolerance):
-                step = self.run(
-                    problem,
-                    steps,
-                    tolerance,
-                    step.number + soon,
-                    divergence=RESIDUALS.divergence,
-                    after=step,
-                )
             if self.converged(tolerance):
                 if not coarse and not self.is_guess:
                     self.by_first_order = self.figures_of(back_to_first_order(problem, step))
@@ -260,13 +247,7 @@ class MixedSearch(ExactFaceSearch):
                 content = step.balance.content
                 if length >= MARCHING.final_length:
                     break
-                length *= (
-                    (MARCHING.growth if length >= 1.0 else 3.0)
-                    if step.number <= 2
-                    else 2.0
-                    if step.number <= 4
-                    else 1.2
-                )
+                length *= 3.0 if step.number <= 2 else 2.0 if step.number <= 4 else 1.2
             elif length < MARCHING.min_length * first:
                 break
             else:  # residuals of earlier steps may cause cycles: a closer tolerance
@@ -288,7 +269,7 @@ class MixedSearch(ExactFaceSearch):
         refilled, start = _refilled(problem, unknowns)
         steps = newton(refilled, start, second_order=False)
         roughly = RESIDUALS.coarse_grid
-        step = self.run(refilled, steps, roughly, MARCHING.max_newton_steps)
+        step = self.run(refilled, steps, roughly, CONTINUATION.max_iterations)
         steps = newton(problem, unknowns_of(step), second_order=False)
         limits = (self.options.tolerance, CONTINUATION.max_iterations)
         return self.run(problem, steps, *limits, divergence=RESIDUALS.divergence)
@@ -331,19 +312,9 @@ class MixedSearch(ExactFaceSearch):
         return step
 
     def solve_coarse(self, problem: Problem, unknowns: Pressures) -> Step:
-        """Solve roughly, as a guess for the next finer grid.
-
-        Smooth bodies alternate a few steps and local refinement.
-        """
+        """Solve roughly, as a guess for the next finer grid."""
         tolerance = max(RESIDUALS.coarse_grid, self.options.tolerance)
         steps = newton(replace(problem, conserve=False), unknowns, second_order=False)
-        for _ in range(SEARCH.max_smooth_turns if problem.accurate else 0):
-            step = self.run(problem, steps, tolerance, SEARCH.steps_per_turn)
-            if self.converged(tolerance):
-                return step
-            if step.balance.residual_rms < RESIDUALS.guess:
-                break
-            steps = newton(problem, refine_locally(problem, unknowns_of(step)), second_order=False)
         return self.run(problem, steps, tolerance, CONTINUATION.max_iterations)
 
     def from_dry(self, levels: Sequence[Problem]) -> Step:
