@@ -12,7 +12,7 @@ from asperity.core.errors import AsperityError, BadInput, UnreadableFile
 from asperity.core.storage import netcdf_bytes, write_with_digest
 from asperity.ehl import ContactSolution, Convergence, Iteration, Options, SolveStatus
 from asperity.ehl.contact_solution import FORMAT
-from asperity.ehl.outcome import Figures, GridError, Strategy
+from asperity.ehl.outcome import Figures, GridError, SolveStrategy
 from asperity.lubricant import (
     Barus,
     DowsonHigginson,
@@ -57,7 +57,7 @@ def solution():
             steps,
             3e-7,
             0.1 + 0.2,
-            Strategy.FIXED_APPROACH,
+            SolveStrategy.FIXED_APPROACH,
             small,
             GridError(
                 car=0.2 / 3.0,

@@ -17,7 +17,7 @@ from asperity.ehl.grid_transfer import average
 from asperity.ehl.models.mixed import Pressures
 from asperity.ehl.newton.mixed import newton as mixed_newton
 from asperity.ehl.newton.single_pressure import newton
-from asperity.ehl.outcome import Figures, Strategy
+from asperity.ehl.outcome import Figures, SolveStrategy
 from asperity.ehl.problem_setup import contact_problem, first_guess, grid_levels
 from asperity.ehl.scales import Scales
 from asperity.ehl.strategies.mixed_search import MixedSearch
@@ -217,7 +217,7 @@ def test_odd_numbers_of_cells_are_possible():
 def test_a_failed_attempt_is_repeated_at_fixed_approach(monkeypatch):
     surface, options = rough(grid((64, 48)), 1e-6, correlation_length=40e-6), Options(model="paper")
     usual = solved(surface, options=options)
-    assert usual.convergence.attempt == Strategy.COARSE_TO_FINE
+    assert usual.convergence.attempt == SolveStrategy.COARSE_TO_FINE
 
     def stalled_newton(problem, pressure, approach, *, fixed=False):
         for step in newton(problem, pressure, approach, fixed=fixed):
@@ -229,8 +229,8 @@ def test_a_failed_attempt_is_repeated_at_fixed_approach(monkeypatch):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(searching.Search, "run", limited(searching.Search.run))
         retried = solved(surface, options=options)
-    assert retried.convergence.attempt == Strategy.FIXED_APPROACH
-    assert Strategy.FIXED_APPROACH in retried.convergence.explain()
+    assert retried.convergence.attempt == SolveStrategy.FIXED_APPROACH
+    assert SolveStrategy.FIXED_APPROACH in retried.convergence.explain()
     assert contact_state(retried).clr == pytest.approx(contact_state(usual).clr, abs=2e-3)
 
 
@@ -245,12 +245,12 @@ def test_hertz_pressure_is_the_start_if_the_dry_contact_fails(monkeypatch):
 
     monkeypatch.setattr(MixedSearch, "from_dry", stalled_search)
     retried = solved(surface)
-    assert usual.convergence.attempt == Strategy.FROM_DRY
-    assert retried.convergence.attempt == Strategy.COARSE_TO_FINE
+    assert usual.convergence.attempt == SolveStrategy.FROM_DRY
+    assert retried.convergence.attempt == SolveStrategy.COARSE_TO_FINE
     assert contact_state(retried).clr == pytest.approx(contact_state(usual).clr, abs=2e-3)
 
 
-@pytest.mark.parametrize("strategy", [Strategy.COARSE_TO_FINE, Strategy.FROM_DRY])
+@pytest.mark.parametrize("strategy", [SolveStrategy.COARSE_TO_FINE, SolveStrategy.FROM_DRY])
 @pytest.mark.parametrize("model", ["mixed", "conserving"])
 def test_a_strategys_error_is_estimated_from_its_own_iterations(model, strategy):
     """Results of a failed strategy do not enter the next one's error; the cell size always does."""
@@ -273,7 +273,7 @@ def test_a_strategys_error_is_estimated_from_its_own_iterations(model, strategy)
 @pytest.mark.parametrize("model", ["paper", "mixed"])
 def test_a_heavy_smooth_ball_in_isoviscous_oil_is_solved_at_the_first_attempt(model):
     solution = isoviscous_ball(model)
-    assert solution.convergence.attempt == Strategy.COARSE_TO_FINE
+    assert solution.convergence.attempt == SolveStrategy.COARSE_TO_FINE
     # without first-order iterations 125 or 211, depending on the processor
     assert len(solution.convergence.history) < 30
     assert contact_state(solution).reynolds_residual < 1e-5
@@ -289,7 +289,7 @@ def test_a_smooth_contact_falls_back_on_the_first_order_wedge(monkeypatch):
     monkeypatch.setattr(searching, "newton", stalled_newton)
     monkeypatch.setattr(searching.Search, "run", limited(searching.Search.run))
     retried = isoviscous_ball("paper")
-    assert retried.convergence.attempt == Strategy.SECOND_ORDER
+    assert retried.convergence.attempt == SolveStrategy.SECOND_ORDER
     # the residual of the equations that were solved
     assert contact_state(retried).reynolds_residual < 1e-5
 

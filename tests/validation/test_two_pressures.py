@@ -150,7 +150,7 @@ def test_a_dry_start_by_active_sets_agrees_with_newton(sq, monkeypatch):
     levels = grid_levels(
         contact_problem(contact(hardness=2e9), barus(), rough(grid((96, 96)), sq), MIXED)
     )
-    monkeypatch.setattr(starts, "RESIDUALS", replace(RESIDUALS, guess=1e-5))
+    monkeypatch.setattr(starts, "RESIDUALS", replace(RESIDUALS, rough_solution=1e-5))
     with monkeypatch.context() as newton_only:
         newton_only.setattr(starts, "active_set_dry", lambda _, *start: (*start[:2], False))
         expected = [dry_start(level) for level in levels]

@@ -4,7 +4,7 @@ import pytest
 from benchmarks.robustness import OIL, contacts, overlap, prepared
 
 from asperity.ehl import Options, solve_contact
-from asperity.ehl.outcome import Strategy
+from asperity.ehl.outcome import SolveStrategy
 
 
 @pytest.mark.parametrize(
@@ -17,7 +17,7 @@ from asperity.ehl.outcome import Strategy
 def test_difficult_contacts_are_solved_at_the_first_attempt(number):
     conditions, surface = prepared(contacts()[number], 128)
     solution = solve_contact(conditions, OIL, surface, options=Options(model="paper"))
-    assert solution.convergence.attempt == Strategy.COARSE_TO_FINE
+    assert solution.convergence.attempt == SolveStrategy.COARSE_TO_FINE
     assert overlap(solution) < 0.1e-9
 
 
@@ -34,5 +34,5 @@ def test_difficult_contacts_are_solved_at_the_first_attempt(number):
 def test_the_mixed_model_solves_contacts_that_used_to_cycle(number):
     conditions, surface = prepared(contacts()[number], 64)
     solution = solve_contact(conditions, OIL, surface)
-    assert solution.convergence.attempt in (Strategy.COARSE_TO_FINE, Strategy.FROM_DRY)
+    assert solution.convergence.attempt in (SolveStrategy.COARSE_TO_FINE, SolveStrategy.FROM_DRY)
     assert solution.convergence.iterations < 200

@@ -34,6 +34,7 @@ from .outcome import GridError as GridError
 from .outcome import Iteration as Iteration
 from .outcome import Options as Options
 from .outcome import SolveStatus as SolveStatus
+from .outcome import SolveStrategy as SolveStrategy
 from .outcome import Start as Start
 from .running_grid import MOST_RUNNING_CELLS as MOST_RUNNING_CELLS
 from .running_grid import half_as_many as half_as_many

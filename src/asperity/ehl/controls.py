@@ -11,8 +11,10 @@ from dataclasses import dataclass
 class Residuals:
     """Residuals at which the search changes its method."""
 
-    near_solution: float = 0.1  # a result with more is no initial guess for the next grid
-    guess: float = 1e-2  # of the first-order wedge or the dry contact, before the equations solved
+    initial_guess: float = 0.1  # a result with more is no initial guess for the next grid
+    rough_solution: float = (
+        1e-2  # of the first-order wedge or the dry contact, before the equations solved
+    )
     coarse_grid: float = 1e-3  # of a coarser grid, whose solution only has to be a good guess
     divergence: float = 10.0  # ratio to the initial residual from which steps seldom recover
 
@@ -25,6 +27,7 @@ class StepLimits:
     max_relative_step: float = 0.5  # ... or in its own pressure: elastic asperities reach 100 p_h
     # in a²/R or rms roughness, whichever is more: a contact at the cap responds nonlinearly
     max_approach_step: float = 0.3
+    approach_growth: float = 1.2  # of the approach limit from step to step without reversal
     stagnation_iterations: int = 8  # without a decrease, until the damping changes
     min_damping: float = 1.0 / 16.0  # a line search stops there
 

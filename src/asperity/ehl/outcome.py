@@ -56,7 +56,7 @@ class Options:
             )
 
 
-class Strategy(StrEnum):
+class SolveStrategy(StrEnum):
     """Way to a solution; its text completes the sentence on the outcome."""
 
     COARSE_TO_FINE = "coarse to fine"
@@ -170,7 +170,7 @@ class Convergence:
     history: tuple[Iteration, ...]
     tolerance: float
     seconds: float
-    attempt: Strategy = Strategy.COARSE_TO_FINE
+    attempt: SolveStrategy = SolveStrategy.COARSE_TO_FINE
     iteration_error: Figures | None = None
     discretisation_error: GridError | None = None
 
@@ -194,9 +194,9 @@ class Convergence:
     def explain(self) -> str:
         """Return one sentence on the outcome of the solve."""
         last = self.history[-1]
-        tried = "" if self.attempt == Strategy.COARSE_TO_FINE else f" ({self.attempt})"
+        tried = "" if self.attempt == SolveStrategy.COARSE_TO_FINE else f" ({self.attempt})"
         # the first attempt for thin films, the second for thick ones
-        if self.attempt == Strategy.FROM_DRY:
+        if self.attempt == SolveStrategy.FROM_DRY:
             tried = f" {self.attempt}"
         return (
             f"{self.status}{tried} after {self.iterations} steps in {self.seconds:.2f} s: "

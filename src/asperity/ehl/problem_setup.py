@@ -14,7 +14,7 @@ from asperity.ehl.film_formulas import central_film, least_film, least_films
 from asperity.ehl.grid_design import MIN_CELLS_SHORT_AXIS, MIN_COARSE_CELLS, inlet_length
 from asperity.ehl.inlet_layer import InletLayer
 from asperity.ehl.models.single_pressure import Problem
-from asperity.ehl.outcome import CONSERVING, TWO_PRESSURES, Options, Strategy
+from asperity.ehl.outcome import CONSERVING, TWO_PRESSURES, Options, SolveStrategy
 from asperity.ehl.roller_profile import BodyShape, RollerProfile
 from asperity.ehl.scales import Scales
 from asperity.lubricant import Lubricant
@@ -28,7 +28,7 @@ def contact_problem(
     options: Options,
     viscosity_factor: Field | None = None,
     *,
-    strategy: Strategy = Strategy.COARSE_TO_FINE,
+    strategy: SolveStrategy = SolveStrategy.COARSE_TO_FINE,
 ) -> Problem:
     """Return the dimensionless problem of a strategy on the surface's grid."""
     scales = Scales.from_conditions(conditions, lubricant)
@@ -49,12 +49,12 @@ def contact_problem(
         p_scale=scales.pressure,
         lubricant=lubricant,
         viscosity_factor=viscosity_factor,
-        accurate=strategy == Strategy.COARSE_TO_FINE
+        accurate=strategy == SolveStrategy.COARSE_TO_FINE
         and not np.any(surface.heights)
         and options.model != CONSERVING,
         exact=options.model in TWO_PRESSURES
         and lubricant is not None
-        and strategy != Strategy.ARITHMETIC_MEANS
+        and strategy != SolveStrategy.ARITHMETIC_MEANS
         and bool(np.any(surface.heights)),
         conserve=options.model == CONSERVING and lubricant is not None,
         inlet_layer=_inlet_layer(options, scales),

@@ -18,7 +18,7 @@ from asperity.ehl.film_formulas import central_film, require_thin_film
 from asperity.ehl.models.elastic_dry import elastic_contact
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.single_pressure import Step, newton
-from asperity.ehl.outcome import PAPER, Options, Strategy
+from asperity.ehl.outcome import PAPER, Options, SolveStrategy
 from asperity.ehl.problem_setup import (
     contact_problem,
     first_guess,
@@ -117,12 +117,16 @@ def solve_unified(
     else:
         levels = [finest]
         guess = _warm_start(start, finest, scales)
-    for strategy in (Strategy.COARSE_TO_FINE, Strategy.SECOND_ORDER, Strategy.FIXED_APPROACH):
-        if strategy == Strategy.SECOND_ORDER:
+    for strategy in (
+        SolveStrategy.COARSE_TO_FINE,
+        SolveStrategy.SECOND_ORDER,
+        SolveStrategy.FIXED_APPROACH,
+    ):
+        if strategy == SolveStrategy.SECOND_ORDER:
             if not finest.accurate:
                 continue
             levels = [replace(level, accurate=False) for level in levels]
-        step = search.solve_levels(levels, *guess, fixed=strategy == Strategy.FIXED_APPROACH)
+        step = search.solve_levels(levels, *guess, fixed=strategy == SolveStrategy.FIXED_APPROACH)
         if search.converged(options.tolerance):
             break
     solution = search.solution(
@@ -154,12 +158,12 @@ def solve_mixed(
     full_problem = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
     finest = reduced_problem(full_problem)
     search = MixedSearch(options, scales.gap, progress)
-    if start is not None and start.convergence.attempt == Strategy.ARITHMETIC_MEANS:
+    if start is not None and start.convergence.attempt == SolveStrategy.ARITHMETIC_MEANS:
         search.arithmetic, finest = True, replace(finest, exact=False)
     if conditions.geometry == "roller":
         search.most_work = SEARCH.max_roller_work * options.max_iterations * finest.roughness.size
     if start is not None:
-        strategy, unknowns = Strategy.COARSE_TO_FINE, pressures_of(start, finest, scales)
+        strategy, unknowns = SolveStrategy.COARSE_TO_FINE, pressures_of(start, finest, scales)
         if options.inlet_layer is None:
             step = search.continue_from(finest, unknowns)
         else:
@@ -172,7 +176,7 @@ def solve_mixed(
         conditions,
         lubricant,
         seconds=time.perf_counter() - began,
-        strategy=Strategy.ARITHMETIC_MEANS if search.arithmetic else strategy,
+        strategy=SolveStrategy.ARITHMETIC_MEANS if search.arithmetic else strategy,
         start=start,
     )
     return replace(solution, viscosity_factor=viscosity_factor)
@@ -220,23 +224,25 @@ def _solve_cold(
     surface: Surface,
     conditions: ContactConditions,
     lubricant: Lubricant,
-) -> tuple[Strategy, Step]:
+) -> tuple[SolveStrategy, Step]:
     """Solve without a neighbouring solution; return the strategy and its last step."""
     options, scales = search.options, Scales.from_conditions(conditions, lubricant)
     film, robust = smooth_film(conditions, lubricant), replace(finest, exact=False)
     tolerance, search.is_guess = options.tolerance, finest.exact
     if finest.exact:
-        tolerance = max(tolerance, RESIDUALS.guess)
+        tolerance = max(tolerance, RESIDUALS.rough_solution)
         search.options = replace(options, tolerance=tolerance)
     for strategy in _strategies(surface, film, options.contact_film):
-        problem = robust if strategy == Strategy.COARSE_TO_FINE else replace(robust, accurate=False)
+        problem = (
+            robust if strategy == SolveStrategy.COARSE_TO_FINE else replace(robust, accurate=False)
+        )
         levels = usable_levels(problem, conditions, lubricant)
         step = search.solve_by(
             strategy, levels, lambda on: first_guess(on, conditions, lubricant, scales)
         )
         if search.converged(tolerance):
             if (
-                strategy != Strategy.COARSE_TO_FINE
+                strategy != SolveStrategy.COARSE_TO_FINE
                 and finest.accurate
                 and finest.form.roller is not None
             ):
@@ -251,12 +257,12 @@ def _solve_cold(
     return strategy, step
 
 
-def _strategies(surface: Surface, film: float, contact_film: float) -> tuple[Strategy, ...]:
+def _strategies(surface: Surface, film: float, contact_film: float) -> tuple[SolveStrategy, ...]:
     """Return the strategies in their order, by the film [m] of the smooth bodies."""
-    coarse_to_fine, from_dry = Strategy.COARSE_TO_FINE, Strategy.FROM_DRY
+    coarse_to_fine, from_dry = SolveStrategy.COARSE_TO_FINE, SolveStrategy.FROM_DRY
     if np.any(surface.heights):
         return (from_dry, coarse_to_fine) if film < surface.sq else (coarse_to_fine, from_dry)
-    smooth = (coarse_to_fine, Strategy.SECOND_ORDER)
+    smooth = (coarse_to_fine, SolveStrategy.SECOND_ORDER)
     return (from_dry, *smooth) if film < contact_film else smooth
 
 

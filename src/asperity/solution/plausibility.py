@@ -24,7 +24,7 @@ from asperity.ehl import (
 from asperity.ehl.film_formulas import central_film
 from asperity.ehl.grid_design import CELLS_IN_INLET, MAX_CLR_ERROR, MAX_FILM_ERROR
 from asperity.ehl.load_shares import carried_share
-from asperity.ehl.outcome import Strategy
+from asperity.ehl.outcome import SolveStrategy
 from asperity.lubricant import Barus, Lubricant, Roelands
 from asperity.solution.ends import LOADED_END, axial_distribution
 from asperity.solution.regime import far_from_fits
@@ -320,7 +320,7 @@ def _of_solution(solution: ContactSolution, *, standing: bool) -> Iterator[str]:
     if edges := _reached_edges(solution):
         yield f"The contact reaches the {edges} of the grid and is cut off there. Widen the grid."
     yield from _of_cells(solution)
-    if solution.convergence.attempt == Strategy.ARITHMETIC_MEANS:
+    if solution.convergence.attempt == SolveStrategy.ARITHMETIC_MEANS:
         yield (
             "The hot film is solved with arithmetic mean mobilities of the faces between cells, "
             "which drain thin films too fast: CLR is too high, by up to 0.3 on a coarse grid."

@@ -22,7 +22,7 @@ from asperity.ehl import (
     SolveStatus,
 )
 from asperity.ehl.contact_solution import DESCRIBED, ERRORS, FORMAT, HEADINGS, OIL, STEPS
-from asperity.ehl.outcome import Strategy
+from asperity.ehl.outcome import SolveStrategy
 from asperity.lubricant import make_lubricant
 from asperity.surface import Surface
 
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     import xarray
 
 EARLIER_TEXTS = {  # of strategies, in files of earlier versions
-    "with the second-order wedge of rough bodies": Strategy.SECOND_ORDER,
-    "with the bodies held while their distance was searched": Strategy.FIXED_APPROACH,
+    "with the second-order wedge of rough bodies": SolveStrategy.SECOND_ORDER,
+    "with the bodies held while their distance was searched": SolveStrategy.FIXED_APPROACH,
 }
 
 
@@ -123,8 +123,8 @@ def _convergence(described: dict[str, Any], history: tuple[Iteration, ...]) -> C
     values: dict[str, Any] = {
         name: value for name, value in described.items() if name not in ("status", *ERRORS)
     }
-    text = described.get("attempt", Strategy.COARSE_TO_FINE)
-    values["attempt"] = EARLIER_TEXTS.get(text) or Strategy(text)
+    text = described.get("attempt", SolveStrategy.COARSE_TO_FINE)
+    values["attempt"] = EARLIER_TEXTS.get(text) or SolveStrategy(text)
     errors: dict[str, Any] = dict.fromkeys(ERRORS)
     if described.get("iteration_error"):
         errors["iteration_error"] = Figures(**described["iteration_error"])

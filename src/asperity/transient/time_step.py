@@ -21,7 +21,7 @@ from asperity.ehl.models.mixed import MixedBalance, Pressures, evaluate
 from asperity.ehl.models.single_pressure import Balance, Problem
 from asperity.ehl.models.transient_term import TransientTerm
 from asperity.ehl.newton.single_pressure import Step
-from asperity.ehl.outcome import CONSERVING, MIXED, TWO_PRESSURES, Strategy
+from asperity.ehl.outcome import CONSERVING, MIXED, TWO_PRESSURES, SolveStrategy
 from asperity.ehl.problem_setup import contact_problem
 from asperity.ehl.strategies.grid_continuation import Search
 from asperity.ehl.strategies.mixed_search import MixedSearch
@@ -112,7 +112,7 @@ class TransientContact:
         # shares of the bodies in the flattening
         self.shares = [float(is_rough) / max(sum(surfaces.rough), 1) for is_rough in surfaces.rough]
         # smooth bodies: the accurate wedge
-        self.strategy = Strategy.SECOND_ORDER if rough else Strategy.COARSE_TO_FINE
+        self.strategy = SolveStrategy.SECOND_ORDER if rough else SolveStrategy.COARSE_TO_FINE
         self.follows_oil = rough and (
             cells.is_integer() if self.options.model in TWO_PRESSURES else cells == 1.0
         )
@@ -200,18 +200,18 @@ class TransientContact:
             starts.append(Pressures(oil, pressure, approach))
         return min(starts, key=lambda start: self._balance(problem, start).residual_rms)
 
-    def _search(self, problem: Problem, unknowns: Pressures) -> tuple[Search, Step, Strategy]:
+    def _search(self, problem: Problem, unknowns: Pressures) -> tuple[Search, Step, SolveStrategy]:
         """Solve a step; return the search, its last iterate and the strategy used."""
         if self.options.model in TWO_PRESSURES:
             mixed = MixedSearch(self.options, self.scales.gap, None)
-            return mixed, mixed.continue_from(problem, unknowns), Strategy.COARSE_TO_FINE
+            return mixed, mixed.continue_from(problem, unknowns), SolveStrategy.COARSE_TO_FINE
         search = Search(self.options, self.scales.gap, None)
         # if Newton's method fails: at fixed approach, found by bracketing
         for fixed in (False, True):
             step = search.solve_levels([problem], unknowns.total, unknowns.approach, fixed=fixed)
             if search.converged(self.options.tolerance):
                 break
-        return search, step, Strategy.FIXED_APPROACH if fixed else Strategy.COARSE_TO_FINE
+        return search, step, SolveStrategy.FIXED_APPROACH if fixed else SolveStrategy.COARSE_TO_FINE
 
     def _balance(self, problem: Problem, unknowns: Pressures) -> Balance | MixedBalance:
         if self.options.model in TWO_PRESSURES:

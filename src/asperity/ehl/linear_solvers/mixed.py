@@ -418,6 +418,6 @@ def _linear_tolerance(linear: MixedLinear) -> float:
     if balance.problem.exact and balance.problem.past is not None:
         least, largest = MIXED_SOLVER.tolerance_close, MIXED_SOLVER.max_tolerance_time_step
         return min(max(least, residual), largest)
-    if balance.problem.exact and residual < RESIDUALS.near_solution:
+    if balance.problem.exact and residual < RESIDUALS.initial_guess:
         return MIXED_SOLVER.tolerance_close
     return KRYLOV.tolerance

@@ -174,7 +174,7 @@ def _search_below(
     higher residual.
     """
     bound = max(watch.last)
-    whole = watch.last[-1] < RESIDUALS.near_solution and not watch.stagnated
+    whole = watch.last[-1] < RESIDUALS.initial_guess and not watch.stagnated
     least = 1.0 if whole else STEP_LIMITS.min_damping
     damping, best = 1.0, None
     while True:

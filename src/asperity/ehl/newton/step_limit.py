@@ -35,7 +35,7 @@ class StepLimit:
 
 
 class ApproachLimit:
-    """Largest change of the approach; doubles without reversals, halves with them.
+    """Largest change of the approach; grows without reversals, halves with them.
 
     It is a share of the largest of a²/R, the roughness, and the `film` of a light contact.
     """
@@ -47,7 +47,7 @@ class ApproachLimit:
     def __call__(self, step: float) -> float:
         """Return the limited step."""
         reverses = step * self.previous < 0.0 and abs(step) > 0.5 * self.current
-        grown = min(2.0 * self.current, self.largest)
+        grown = min(STEP_LIMITS.approach_growth * self.current, self.largest)
         self.current, self.previous = 0.5 * self.current if reverses else grown, step
         return float(np.clip(step, -self.current, self.current))
 

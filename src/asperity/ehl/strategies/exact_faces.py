@@ -43,7 +43,9 @@ class ExactFaceSearch(Search):
         if not coarse:
             return tolerance, max_steps
         roughly = (
-            RESIDUALS.coarse_grid if problem.accurate or from_coarse else 0.5 * RESIDUALS.guess
+            RESIDUALS.coarse_grid
+            if problem.accurate or from_coarse
+            else 0.5 * RESIDUALS.rough_solution
         )
         return max(roughly, tolerance), min(CONTINUATION.max_iterations, max_steps)
 
@@ -78,7 +80,7 @@ class ExactFaceSearch(Search):
         step = self.run(problem, steps, tolerance, first_limit)
         if self.converged(tolerance):
             return step
-        roughly = max(RESIDUALS.guess, tolerance)
+        roughly = max(RESIDUALS.rough_solution, tolerance)
         steps = newton(problem, unknowns, second_order=False, shared=False)
         step = self.run(problem, steps, roughly, max_steps)
         steps = newton(problem, unknowns_of(step), second_order=True, shared=False)
@@ -100,7 +102,7 @@ def back_to_first_order(problem: Problem, step: Step) -> Step:
                 abs(load_share_of(back) - load_share_of(other)) for other in (previous, step)
             )
             if (
-                back.balance.residual_rms < RESIDUALS.guess
+                back.balance.residual_rms < RESIDUALS.rough_solution
                 or change < SEARCH.backward_tolerance * total_change
             ):
                 break

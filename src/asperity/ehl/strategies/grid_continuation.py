@@ -22,7 +22,7 @@ from asperity.ehl.outcome import (
     Iteration,
     Options,
     SolveStatus,
-    Strategy,
+    SolveStrategy,
 )
 from asperity.ehl.problem_setup import coarser_in_all_axes
 from asperity.ehl.scales import Scales
@@ -127,10 +127,10 @@ class Search:
         if problem.accurate and diverged:
             pressure, approach = self.robust_start(problem, pressure, approach)
             step = self.run(problem, newton(problem, pressure, approach), tolerance, max_steps)
-        if bracket and not self.converged(RESIDUALS.near_solution):
+        if bracket and not self.converged(RESIDUALS.initial_guess):
             # the load of a capped contact is too nonlinear in the approach for Newton
             trial = self.bracket_approach(problem, pressure, approach, tolerance, from_outside=True)
-            step = trial if self.converged(RESIDUALS.near_solution) else step
+            step = trial if self.converged(RESIDUALS.initial_guess) else step
         return step
 
     def robust_start(
@@ -144,12 +144,12 @@ class Search:
         step = self.run(
             sturdy,
             newton(sturdy, pressure, approach),
-            RESIDUALS.near_solution,
+            RESIDUALS.initial_guess,
             CONTINUATION.max_iterations,
         )
         return (
             (step.balance.pressure, step.approach)
-            if self.converged(RESIDUALS.near_solution)
+            if self.converged(RESIDUALS.initial_guess)
             else (pressure, approach)
         )
 
@@ -169,7 +169,7 @@ class Search:
         """
         step = next(steps)
         earlier = step
-        largest_residual = divergence * max(earlier.balance.residual_rms, RESIDUALS.guess)
+        largest_residual = divergence * max(earlier.balance.residual_rms, RESIDUALS.rough_solution)
         while True:
             self._record(problem, step)
             self.failed = step.number > 0 and not np.isfinite(step.change)
@@ -227,7 +227,7 @@ class Search:
         lubricant: Lubricant | None,
         *,
         seconds: float,
-        strategy: Strategy = Strategy.COARSE_TO_FINE,
+        strategy: SolveStrategy = SolveStrategy.COARSE_TO_FINE,
         start: ContactSolution | None = None,
     ) -> ContactSolution:
         """Return the result of the search in SI units on the surface's grid.

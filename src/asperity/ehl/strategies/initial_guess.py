@@ -49,7 +49,9 @@ def dry_start(problem: Problem, coarser: Pressures | None = None) -> tuple[Field
     approach_guess = (
         _first_contact(dry, guess) if coarser is None else coarser.approach - problem.contact_gap
     )
-    pressure, approach, converged = active_set_dry(dry, guess, approach_guess, RESIDUALS.guess)
+    pressure, approach, converged = active_set_dry(
+        dry, guess, approach_guess, RESIDUALS.rough_solution
+    )
     if converged:
         return pressure, approach
     if coarser is not None:
@@ -82,9 +84,9 @@ def _by_newton(dry: Problem, pressure: Field, approach: float) -> tuple[Step, bo
     """Return the result of Newton steps, and whether it suffices as an initial guess."""
     for step in newton(dry, pressure, approach):
         residual = max(step.balance.residual_rms, abs(step.balance.load_error))
-        if residual < RESIDUALS.guess or step.number == CONTINUATION.max_iterations:
+        if residual < RESIDUALS.rough_solution or step.number == CONTINUATION.max_iterations:
             break
-    return step, residual < RESIDUALS.guess
+    return step, residual < RESIDUALS.rough_solution
 
 
 def interpolate_unknowns(problem: Problem, unknowns: Pressures) -> Pressures:

@@ -47,7 +47,7 @@ def _solved(problem: Problem, start: Pressures) -> tuple[Field, Field]:
             least = residual
             best = step.balance.unknowns
         if (
-            least < RESIDUALS.near_solution * first
+            least < RESIDUALS.initial_guess * first
             or step.number == MARCHING.max_newton_steps
             or not np.isfinite(residual)
         ):

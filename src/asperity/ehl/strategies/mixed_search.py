@@ -15,7 +15,7 @@ from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.models.transient_term import TransientTerm
 from asperity.ehl.newton.mixed import newton
 from asperity.ehl.newton.single_pressure import Step
-from asperity.ehl.outcome import Strategy
+from asperity.ehl.outcome import SolveStrategy
 from asperity.ehl.problem_setup import coarser_in_all_axes, grid_levels
 from asperity.ehl.scales import Scales
 from asperity.ehl.strategies.exact_faces import ExactFaceSearch, back_to_first_order
@@ -53,7 +53,7 @@ class MixedSearch(ExactFaceSearch):
         lubricant: Lubricant | None,
         *,
         seconds: float,
-        strategy: Strategy = Strategy.COARSE_TO_FINE,
+        strategy: SolveStrategy = SolveStrategy.COARSE_TO_FINE,
         start: ContactSolution | None = None,
     ) -> ContactSolution:
         """Return the result of the search with the state of the oil."""
@@ -65,17 +65,17 @@ class MixedSearch(ExactFaceSearch):
 
     def solve_by(
         self,
-        strategy: Strategy,
+        strategy: SolveStrategy,
         levels: Sequence[Problem],
         guess: Callable[[Problem], tuple[Field, float]],
     ) -> Step:
         """Solve by one of the strategies on the first of the levels."""
         self.cell, self.by_first_order = levels[0].spacing[0], None  # not an earlier strategy's
-        if strategy == Strategy.FROM_DRY:
+        if strategy == SolveStrategy.FROM_DRY:
             return self.from_dry(levels)
         step = self.coarse_to_fine(levels, guess)
         # sharp ends need the robust strategy
-        sharp_ends = levels[0].form.roller is not None and strategy == Strategy.COARSE_TO_FINE
+        sharp_ends = levels[0].form.roller is not None and strategy == SolveStrategy.COARSE_TO_FINE
         # smooth bodies: oil and asperities never share a cell
         single_pressure_suffices = self.smooth and not sharp_ends
         if single_pressure_suffices and not self.converged(self.options.tolerance):
@@ -143,7 +143,7 @@ class MixedSearch(ExactFaceSearch):
                 return step
         return self.solve_from_afar(problem, unknowns, coarse=coarse, last=last)
 
-    def refine_third_order(self, problem: Problem, step: Step) -> tuple[Strategy, Step]:
+    def refine_third_order(self, problem: Problem, step: Step) -> tuple[SolveStrategy, Step]:
         """Refine a robust solution of smooth bodies with the third-order wedge.
 
         Returns strategy and step, those of the robust solution if this fails.
@@ -159,9 +159,9 @@ class MixedSearch(ExactFaceSearch):
         )
         if self.converged(self.options.tolerance):
             self.figures[-1] = self.figures_of(better)
-            return Strategy.COARSE_TO_FINE, better
+            return SolveStrategy.COARSE_TO_FINE, better
         self.history, self.figures, self.iteration_error = history, figures, error
-        return Strategy.SECOND_ORDER, step
+        return SolveStrategy.SECOND_ORDER, step
 
     def solve_from_afar(
         self,
@@ -196,7 +196,7 @@ class MixedSearch(ExactFaceSearch):
         step = self._solve_first_order(
             problem, unknowns, length, min(max_steps, SEARCH.max_long_iterations), tolerance
         )
-        if not self.converged(RESIDUALS.near_solution):
+        if not self.converged(RESIDUALS.initial_guess):
             return step
         self.by_first_order = self.figures_of(step)
         return self.run(
@@ -207,12 +207,12 @@ class MixedSearch(ExactFaceSearch):
         self, problem: Problem, unknowns: Pressures, length: float, max_steps: int, tolerance: float
     ) -> Step:
         """Solve roughly with the first-order wedge; retry from more accurate time steps."""
-        roughly = max(RESIDUALS.guess, tolerance)
+        roughly = max(RESIDUALS.rough_solution, tolerance)
         steps = newton(problem, unknowns, second_order=False)
         step = self.run(problem, steps, roughly, max_steps, divergence=RESIDUALS.divergence)
         if self.converged(roughly):
             return step
-        step = self.march_in_time(problem, unknowns, length, tolerance=RESIDUALS.guess)
+        step = self.march_in_time(problem, unknowns, length, tolerance=RESIDUALS.rough_solution)
         steps = newton(problem, unknowns_of(step), second_order=False)
         return self.run(problem, steps, roughly, max_steps)
 
@@ -251,7 +251,7 @@ class MixedSearch(ExactFaceSearch):
             elif length < MARCHING.min_length * first:
                 break
             else:  # residuals of earlier steps may cause cycles: a closer tolerance
-                length, tolerance = 0.25 * length, min(tolerance, RESIDUALS.guess)
+                length, tolerance = 0.25 * length, min(tolerance, RESIDUALS.rough_solution)
         return step
 
     def from_refilled_cavities(self, problem: Problem, unknowns: Pressures, length: float) -> Step:
@@ -298,10 +298,10 @@ class MixedSearch(ExactFaceSearch):
                 )
             else:
                 step = self.solve_coarse(problem, unknowns)
-            if self.smooth and not self.converged(RESIDUALS.guess):
+            if self.smooth and not self.converged(RESIDUALS.rough_solution):
                 self.figures, unknowns, coarser = [], None, None
                 continue
-            if problem is not levels[0] and not self.converged(RESIDUALS.guess):
+            if problem is not levels[0] and not self.converged(RESIDUALS.rough_solution):
                 self.figures = []  # an initial guess, but no solution to compare with
             elif coarser_in_all_axes(problem, levels[0]):
                 self.keep(problem, step)
@@ -334,11 +334,11 @@ class MixedSearch(ExactFaceSearch):
             else:
                 step = self.solve_from_coarse(problem, start, coarse=not finest, last=False)
             # the effect of oil on the coarser grid was no good guess
-            if coarser is not None and not self.converged(RESIDUALS.near_solution):
+            if coarser is not None and not self.converged(RESIDUALS.initial_guess):
                 step = self.solve_from_afar(
                     problem, dry, coarse=not finest, length=2.0 * problem.spacing[0]
                 )
-            if finest or self.converged(max(RESIDUALS.guess, self.options.tolerance)):
+            if finest or self.converged(max(RESIDUALS.rough_solution, self.options.tolerance)):
                 if coarser_in_all_axes(problem, levels[0]):
                     self.keep(problem, step)
                 coarser = DryAndLubricated(dry, unknowns_of(step))
