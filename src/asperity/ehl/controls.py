@@ -12,9 +12,8 @@ class Residuals:
     """Residuals at which the search changes its method."""
 
     initial_guess: float = 0.1  # a result with more is no initial guess for the next grid
-    rough_solution: float = (
-        1e-2  # of the first-order wedge or the dry contact, before the equations solved
-    )
+    # of the first-order wedge or the dry contact, before the equations solved
+    rough_solution: float = 1e-2
     coarse_grid: float = 1e-3  # of a coarser grid, whose solution only has to be a good guess
     divergence: float = 10.0  # ratio to the initial residual from which steps seldom recover
 
