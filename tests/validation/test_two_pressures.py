@@ -102,12 +102,15 @@ def test_two_starts_give_the_same_solution():
     assert dry.figures[-1].clr == pytest.approx(hertz.figures[-1].clr, abs=0.002)
 
 
-def test_corrections_of_the_coarse_grid_start_the_finer_one():
-    """The same solution in two thirds of the iterations on the fine grid."""
+@pytest.mark.parametrize("seed", [7, 8])
+def test_corrections_of_the_coarse_grid_start_the_finer_one(seed):
+    """The same solution in two thirds of the iterations on the fine grid; a limit of twelve steps
+    after the change of grid is too low for the second surface.
+    """
     conditions, oil, surface = (
         contact(hardness=2e9),
         barus(),
-        rough(grid((192, 192)), 2.5e-6, seed=7),
+        rough(grid((192, 192)), 2.5e-6, seed=seed),
     )
     levels, scales = (
         grid_levels(contact_problem(conditions, oil, surface, MIXED)),
