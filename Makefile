@@ -9,6 +9,9 @@ READY := $(VENV)/.ready
 # one process more than there are processors, as some tests wait
 PARALLEL := -n $(shell echo $$(($$(getconf _NPROCESSORS_ONLN) + 1))) --dist loadfile --no-loadscope-reorder
 
+# compiled modules are kept, even where the environment says otherwise; without them each process compiles its own
+export PYTHONDONTWRITEBYTECODE :=
+
 .PHONY: demo test quick check bench docs installed release attacks clean
 .DEFAULT_GOAL := demo
 

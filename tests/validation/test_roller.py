@@ -235,11 +235,9 @@ def test_the_bar_covers_the_reference_edge_pressure():
 
 @pytest.mark.parametrize("shape", [lundberg(1.5 * LOAD), ISO.tilted(1e-3)])
 def test_the_lubricated_edge_pressure_does_not_depend_on_the_grid_or_the_spike(shape):
-    """The spike grows by a quarter from 96 to 384 cells along x, but the pressure upstream of it
-    does not change.
-    """
+    """The spike grows by up to a tenth from 96 to 192 cells along x, the pressure before it not."""
     (coarse, bar), (across, _), (along, _) = edge_pressures(
-        shape, OIL, (96, 256), (384, 256), (96, 512)
+        shape, OIL, (96, 256), (192, 256), (96, 512)
     )
     assert across == pytest.approx(coarse, rel=1e-3)
     assert along == pytest.approx(coarse, rel=3e-3)
@@ -275,7 +273,7 @@ def test_the_edge_pressure_at_a_capped_end_is_the_cap():
 
 def test_the_film_at_loaded_ends_needs_closely_spaced_cells():
     few, many, finest = (
-        axial_distribution(solved(roller(lundberg(1.5 * LOAD)), OIL, cells=(128, ny - 8), past=4))
+        axial_distribution(solved(roller(lundberg(1.5 * LOAD)), OIL, cells=(96, ny - 8), past=4))
         for ny in (256, 1024, 1536)
     )
     assert few.end_film.value is None

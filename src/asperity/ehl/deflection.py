@@ -196,21 +196,34 @@ def _line_kernel(cells: tuple[int, int], spacing: tuple[float, float]) -> Field:
     kernel = np.empty((nx, ny // 2 + 1))
     edges = (np.arange(nx + 1) - 0.5) * dx
     kernel[:, 0] = -np.diff(edges * np.log(np.abs(edges)) - edges)
-    wave = np.arange(1, ny // 2 + 1) / ny  # waves per cell
-    integral = _integral_beyond(wave, edges[1:], dx, dy)
-    integral *= np.sin(np.pi * wave) * dy / (2.0 * np.pi**2)
-    kernel[:, 1:] = -np.diff(integral, axis=0)
-    kernel[0, 1:] *= 2.0  # its other half
+    # proportional to the size of cells, which changes with load and radius during a cycle
+    np.multiply(_wave_kernel(cells, float(f"{dy / dx:.13g}")), dx, out=kernel[:, 1:])
     return kernel
 
 
-def _integral_beyond(wave: Field, edges: Field, dx: float, dy: float) -> Field:
+@lru_cache(maxsize=4)
+def _wave_kernel(cells: tuple[int, int], dy: float) -> Field:
+    """Return the waves of `_line_kernel` for cells of length 1 and width `dy`.
+
+    Shape (nx, ny//2).
+    """
+    (nx, ny) = cells
+    wave = np.arange(1, ny // 2 + 1) / ny  # waves per cell
+    integral = _integral_beyond(wave, np.arange(nx) + 0.5, dy)
+    integral *= np.sin(np.pi * wave) * dy / (2.0 * np.pi**2)
+    kernel: Field = -np.diff(integral, axis=0)
+    kernel[0] *= 2.0  # its other half
+    kernel.flags.writeable = False
+    return kernel
+
+
+def _integral_beyond(wave: Field, edges: Field, dy: float) -> Field:
     """Return the integral of all aliases beyond the centre of the first cell and beyond edges."""
     integral = np.zeros((edges.size + 1, wave.size))
     for alias, weight in _aliases(wave):
         integral[0] += (np.pi / 2.0) * weight
         wavenumber = alias * (2.0 * np.pi / dy)
-        count = int(K0_CUTOFF / (wavenumber.min(initial=np.inf) * dx) + 0.5)
+        count = int(K0_CUTOFF / wavenumber.min(initial=np.inf) + 0.5)
         if count > 0:
             argument = np.outer(edges[:count], wavenumber)
             row, column = np.nonzero(argument < K0_CUTOFF)
