@@ -14,6 +14,7 @@ import pytest
 # and take three times the processor time. Read when numpy is loaded, here and in child processes.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.pop("COLUMNS", None)  # of the parallel runner's terminal; output would wrap to it
+os.unsetenv("COLUMNS")  # GNU readline, which pytest imports, sets it beside `os.environ`
 
 HERE = Path(__file__).parent
 SLOW = set((HERE / "slow.txt").read_text("utf-8").split())  # files of more than about 10 s

@@ -47,8 +47,30 @@ def small(tmp_path_factory):
     folder = tmp_path_factory.mktemp("infer") / "emulator"
     setting = inference_setting(load_case(CASE).with_overrides(SMALL))
     with pytest.MonkeyPatch.context() as patch, ThreadPoolExecutor(1) as executor:
-        patch.setattr("asperity.inference.emulator.FINER_POINTS", 6)
+        patch.setattr("asperity.inference.emulator.FINER_POINTS", 3)
         yield setting, build_emulator(setting, folder=folder, executor=executor), folder
+
+
+@pytest.fixture
+def blank_figures(monkeypatch):
+    """Draw the figures of pages, but do not render them, which takes most of a page's time.
+
+    For tests of what pages are made from; of every kind of page, other tests render the figures.
+    """
+
+    def write(_: object, path: Path, **__: object) -> Path:
+        path.write_bytes(b"")
+        return path
+
+    monkeypatch.setattr("asperity.report.base.svg", lambda _: "<svg/>")
+    monkeypatch.setattr("asperity.report.base.write_figure", write)
+
+
+@pytest.fixture
+def two_passages(monkeypatch, short_tracks):  # noqa: ARG001
+    """Solve running roughness over 2 passages of the Hertz zone, half of `short_tracks`."""
+    for module in ("results.running", "transient.running"):
+        monkeypatch.setattr(f"asperity.{module}.PASSAGES", 2)
 
 
 @pytest.fixture

@@ -1,9 +1,12 @@
 """`asperity cycle`: film, load share, friction and wear over a cycle, from the command line."""
 
 import json
+from functools import partial
 from pathlib import Path
 
 import pytest
+
+from asperity.simulation.cycle.film import FILM_TOLERANCE, SmoothContact
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 OSCILLATION = '\n[cycle]\nkind = "oscillation"\nfrequency = "50 Hz"\ninstants = 2\n'
@@ -16,8 +19,16 @@ TABLE = """time_s,load_n,speed_first_m_s,speed_second_m_s,radius_m
 
 @pytest.fixture(autouse=True)
 def coarse_film(monkeypatch):
-    """Solve the smooth bodies on fewer cells; test_cycles compares their films with others."""
+    """Solve the smooth bodies on fewer cells and in longer time steps.
+
+    test_cycles compares their films with others.
+    """
     monkeypatch.setattr("asperity.simulation.cycle.film.MAX_LINE_CELLS", 128)
+    monkeypatch.setattr("asperity.simulation.cycle.film.MAX_OUTPUTS", 80)
+    monkeypatch.setattr(
+        "asperity.simulation.cycle.run.SmoothContact",
+        partial(SmoothContact, film_tolerance=10.0 * FILM_TOLERANCE),
+    )
 
 
 @pytest.fixture

@@ -13,10 +13,16 @@ from asperity.case import load_case
 from asperity.paper import Disturbance, RigSettings, simulate_rig
 from support.emulated import CASE, SMALL
 
-pytestmark = pytest.mark.usefixtures("coarse_search")
+pytestmark = pytest.mark.usefixtures("coarse_search", "blank_figures")
 
 LIMIT = ("--forecast", "clr=0.6")
 QUIET = Disturbance(snr_db=20.0, modes=2)
+
+
+@pytest.fixture(autouse=True)
+def few_draws(monkeypatch):
+    """Sample forecasts until they are rough, in a quarter of the draws."""
+    monkeypatch.setattr("asperity.inference.forecast.ENOUGH", 100.0)
 
 
 @pytest.fixture(scope="module")
@@ -158,6 +164,8 @@ def test_infer_forecasts_with_a_wear_history_and_a_measured_surface(asp, series)
         "grid.cells=[32, 16]",
         "--set",
         "surface.correlation_length='50 um'",
+        "--set",
+        "wear.patches=2",
         "--workers",
         "1",
     )

@@ -11,6 +11,8 @@ from asperity import load_case
 from asperity.core.errors import BadInput
 from asperity.results import stribeck_curve, traction_curve
 
+pytestmark = pytest.mark.usefixtures("two_passages")
+
 SMALL = ("--set", "grid.cells=[48, 32]", "--set", "surface.correlation_length=40 um")
 PNG = b"\x89PNG"
 

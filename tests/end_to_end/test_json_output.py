@@ -11,6 +11,8 @@ import pytest
 from asperity import load_case, solve_case
 from asperity.cli import main
 
+pytestmark = pytest.mark.usefixtures("blank_figures")
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SMALL = ("--surfaces", "1", "--set", "grid.cells=[32, 32]", "--set", "vibration=none")
 SMOOTH = (*SMALL, "--set", "surface=flat")

@@ -130,6 +130,7 @@ def test_only_solving_needs_oil_and_roughness(asp):
     assert not Path("kept").exists()
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_every_contact_is_solved_and_stored_once(asp, monkeypatch):
     monkeypatch.setattr("asperity.machines.solve.solve_case", pytest.fail)  # the worst one again
     arguments = (
@@ -176,12 +177,13 @@ def test_every_contact_is_solved_and_stored_once(asp, monkeypatch):
     assert "holds a study of another case" in err
 
 
+@pytest.mark.usefixtures("short_tracks")
 def test_a_contacts_interval_is_that_of_solve(asp):
     """The interval covers several tracks of one kind; `solve` alone would use more cells."""
     rough = (
         'surface = { kind = "gaussian", sq = "1.2 um", correlation_length = "20 um", seed = 3 }\n'
     )
-    rest = "[grid]\ncells = [96, 48]\n[solver]\nsurfaces = 2\nrunning_cells = 1200\n"
+    rest = "[grid]\ncells = [96, 48]\n[solver]\nsurfaces = 2\nrunning_cells = 800\n"
     Path("discs.toml").write_text(rough + DISCS + rest, "utf-8")
     (row,) = json.loads(asp("machine", "discs.toml", "--workers", "1", "--json")[1])["contacts"]
     assert (row["surfaces"], row["clr_low"] < row["clr"] < row["clr_high"]) == (2, True)
@@ -226,7 +228,7 @@ def test_sliding_keeps_its_sign(asp):
 
 def test_unsolved_contacts_are_reported(asp):
     few = ("--set", "solver.max_iterations=1", "--set", "surface.correlation_length=60 um")
-    code, out, err = asp("machine", "fzg-c.toml", *QUICK, *few)
+    code, out, err = asp("machine", "fzg-c.toml", *QUICK, *few, "--snapshot")
     assert code == 1
     assert "NOT SOLVED" in out.splitlines()[0]
     assert "of 7 contacts were not solved; the first: A: " in err

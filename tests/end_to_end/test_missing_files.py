@@ -14,6 +14,7 @@ from asperity.simulation import load_history, load_wear, run_history, run_wear
 from asperity.study import load_study, plan_study, run_study, study_verdict
 
 SMALL = {"grid.cells": [32, 24], "surface.correlation_length": "40 um"}
+STANDING = {**SMALL, "contact.roughness": "standing"}
 WEAR = '[wear]\nk = "3e-17 1/Pa"\n'
 
 
@@ -22,8 +23,14 @@ def results(tmp_path_factory):
     """Folders with a history of four maps, worn surfaces and a study with maps."""
     pytest.importorskip("zarr", reason="the extra study is not installed")
     folder = tmp_path_factory.mktemp("results")
-    case = papers_case().with_overrides(SMALL)
-    run_history(case, steps=3, every=1, out=folder / "history", strict=False)
+    run_history(
+        papers_case().with_overrides(SMALL),
+        steps=3,
+        every=1,
+        out=folder / "history",
+        strict=False,
+    )
+    case = papers_case().with_overrides(STANDING)
     worn = load_case(f"{case.text}\n{WEAR}", folder=folder, name="wear.toml")
     run_wear(worn, hours=0.5, out=folder / "wear")
     swept = case.with_overrides({"study": {"sq": ["1 um", "2 um"], "seeds": 1}})
@@ -107,6 +114,7 @@ def test_a_run_without_its_state_is_not_resumed(results, tmp_path):
     (tmp_path / "history/memory.npz").unlink()
     with pytest.raises(UnreadableFile, match=r"memory\.npz is missing; restore it"):
         run_history(case, steps=4, every=1, out=tmp_path / "history", strict=False)
+    case = papers_case().with_overrides(STANDING)
     shutil.copytree(results / "wear", tmp_path / "wear")
     (tmp_path / "wear/memory.npz").unlink()
     worn = load_case(f"{case.text}\n{WEAR}", folder=results, name="wear.toml")

@@ -7,12 +7,13 @@ import resource
 import socket
 import threading
 import time
+from contextlib import ExitStack
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 
 import pytest
 
-from support.browser import Visit, chromium, serving, write_small_contact
+from support.browser import ONE_WORKER, Visit, chromium, serving, write_small_contact
 
 pytest.importorskip("panel", reason="the extra page is not installed")
 
@@ -55,24 +56,42 @@ FOREIGN = [  # Host and Origin, of which PORT is the server's
     ("169.254.1.1:PORT", None),
 ]
 
-HOSTILE_HEADERS = [
+IDLE_S = 5  # in place of 20 s, after which the server closes a silent connection
+SHORT_IDLE = f"""
+from asperity.app.serving import server
+assert 0.0 < server.HTTP_LIMITS["idle_connection_timeout"] <= 60.0
+server.HTTP_LIMITS["idle_connection_timeout"] = {IDLE_S}
+{ONE_WORKER}
+"""
+
+HOSTILE_HEADERS = [  # together unless the server may refuse the request for one of them
     {"Host": "evil.example"},
     {"Host": '"><script>pwned</script>'},
-    {"X-Forwarded-Host": "<script>pwned</script>"},
-    {"X-Forwarded-Proto": "javascript"},
-    {"X-Forwarded-Prefix": "/<script>pwned</script>"},
-    {"Referer": "<script>pwned</script>"},
-    {"User-Agent": "<script>pwned</script>"},
     {"Cookie": "is_guest=1; user=<script>pwned</script>"},
     {"Bokeh-Session-Id": "<script>pwned</script>"},
-    {"Accept-Language": "{{7*7}}<script>pwned</script>"},
+    {
+        "X-Forwarded-Host": "<script>pwned</script>",
+        "X-Forwarded-Proto": "javascript",
+        "X-Forwarded-Prefix": "/<script>pwned</script>",
+        "Referer": "<script>pwned</script>",
+        "User-Agent": "<script>pwned</script>",
+        "Accept-Language": "{{7*7}}<script>pwned</script>",
+    },
 ]
 
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory):
+    """Serve a contact, started with the usual limit of 256 open files."""
     folder = tmp_path_factory.mktemp("local")
-    with serving(folder, write_small_contact(folder)) as started:
+    name = write_small_contact(folder)
+    with ExitStack() as stack:
+        limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (256, limits[1]))
+        try:
+            started = stack.enter_context(serving(folder, name, program=("-c", SHORT_IDLE)))
+        finally:
+            resource.setrlimit(resource.RLIMIT_NOFILE, limits)
         yield started
 
 
@@ -106,11 +125,11 @@ def ask(server, path, headers=(), method="GET", body=b""):
     return reply.status, reply.headers, text.decode("utf-8", "replace")
 
 
-def processor_seconds(server):
-    """Return the processor time of the worker processes [s]."""
+def processor_seconds(*processes):
+    """Return the processor time of processes [s]."""
     ticks = 0
-    for child in server.workers:
-        stat = Path(f"/proc/{child}/stat").read_text("utf-8").rpartition(")")[2].split()
+    for process in processes:
+        stat = Path(f"/proc/{process}/stat").read_text("utf-8").rpartition(")")[2].split()
         ticks += int(stat[11]) + int(stat[12])
     return ticks / os.sysconf("SC_CLK_TCK")
 
@@ -144,7 +163,7 @@ def test_names_of_other_servers_are_refused_although_the_cookie_is_right(server,
 @pytest.mark.parametrize("header", HOSTILE_HEADERS, ids=lambda header: next(iter(header)))
 def test_a_header_does_not_appear_in_the_page(server, header):
     status, headers, text = ask(server, "/contact", {**server.cookie, **header})
-    assert status in (200, 400, 403)
+    assert status in ((200,) if len(header) > 1 else (200, 400, 403))
     for hostile in ("pwned", "evil.example", "{{7*7}}"):
         assert hostile not in f"{headers.items()} {text}"
 
@@ -219,19 +238,21 @@ def test_no_answer_leads_to_another_host(server, remote, path):
 
 
 def test_requests_alone_start_no_work(server):
-    """Image tags of another web site started a solve each."""
+    """Image tags of another web site started a solve each, and created figures 4 s later."""
     ask(server, "/contact", server.cookie)
     quiet = 0
     while quiet < 3:  # times, until all workers have loaded the solver
-        before = processor_seconds(server)
+        before = processor_seconds(*server.workers)
         time.sleep(0.5)
-        quiet = quiet + 1 if processor_seconds(server) - before < 0.03 else 0
-    before = processor_seconds(server)
-    for number in range(8):
+        quiet = quiet + 1 if processor_seconds(*server.workers) - before < 0.03 else 0
+    before = processor_seconds(*server.workers)
+    for number in range(4):
         status, _, _ = ask(server, f"/contact?contact.load={500 + number}+N", server.cookie)
         assert status == 200
-    time.sleep(2.0)
-    assert processor_seconds(server) - before < 0.1
+    answered = processor_seconds(server.process.pid)
+    time.sleep(6.0)
+    assert processor_seconds(*server.workers) - before < 0.1
+    assert processor_seconds(server.process.pid) - answered < 0.5  # a page's figures take 0.3 s
 
 
 class Site(BaseHTTPRequestHandler):
@@ -297,26 +318,10 @@ def test_wrong_passwords_take_a_second_each_however_many_are_sent(remote):
     assert ask(remote, "/contact", {"Cookie": cookie.partition(";")[0]})[0] == 200
 
 
-IDLE_S = 5  # in place of 20 s, after which the server closes a silent connection
-SHORT_IDLE = f"""
-import sys
-from asperity.app.serving import server
-from asperity.cli import main
-assert 0.0 < server.HTTP_LIMITS["idle_connection_timeout"] <= 60.0
-server.HTTP_LIMITS["idle_connection_timeout"] = {IDLE_S}
-main(sys.argv[1:])
-"""
-
-
-def test_idle_connections_do_not_stop_the_server(tmp_path):
+def test_idle_connections_do_not_stop_the_server(server):
     """400 connections without a request, where 256 open files are permitted by default."""
-    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (256, limits[1]))
-    try:
-        started = serving(tmp_path, program=("-c", SHORT_IDLE))
-        server = started.__enter__()
-    finally:
-        resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+    limits = Path(f"/proc/{server.process.pid}/limits").read_text("utf-8")
+    assert int(re.search(r"Max open files +(\d+)", limits)[1]) > 400  # raised by the server itself
     port = int(server.host.rpartition(":")[2])
     idle = [socket.create_connection(("127.0.0.1", port), timeout=5) for _ in range(400)]
     assert ask(server, "/contact", server.cookie)[0] == 200
@@ -324,7 +329,6 @@ def test_idle_connections_do_not_stop_the_server(tmp_path):
     assert idle[0].recv(1) == b""  # closed by the server
     for connection in idle:
         connection.close()
-    started.__exit__(None, None, None)
     assert server.log.stat().st_size < 10_000
 
 

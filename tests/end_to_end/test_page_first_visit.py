@@ -48,7 +48,8 @@ def stored_clr():
 def test_the_first_numbers_are_there_within_a_second_although_nothing_is_compiled(
     browser, tmp_path
 ):
-    server = Server(tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "cache"))
+    cache = str(tmp_path / "cache")
+    server = Server(tmp_path, program=("-m", "asperity"), NUMBA_CACHE_DIR=cache)
     before = processor_seconds(server)
     visit = Visit(browser, server)
     visit.page.goto(f"{server.url}contact", wait_until="commit")

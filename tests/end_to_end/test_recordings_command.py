@@ -45,6 +45,7 @@ def rig(tmp_path_factory):
     return folder, write_rig(folder, "knee", repeats=2)
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_track_names_the_stage_and_raises_the_alarm(asp, rig):
     folder, truth = rig
     code, out, err = asp(
@@ -207,6 +208,7 @@ def test_check_reports_good_and_bad_files(asp, rig):
 NESTED = ("depths", "lines", "bands", "sensors")  # parts of a row
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_watch_reads_each_file_once_and_resumes(asp, rig):
     folder, _ = rig
     files = sorted(folder.glob("*.h5"))

@@ -1,7 +1,9 @@
 """Every kind of `asperity new`, followed as it suggests, shows a contact in mixed lubrication.
 
 The commands are those that `asperity new` prints, in the folder of the case. Of machines only the
-contact with the thinnest film is solved; machines, study and inference have coarse, short tracks.
+contact with the thinnest film is solved; machines, study and inference have coarse, short tracks,
+contacts short ones. Only the figures of the line contact and of the moving one are rendered; those
+of other pages are in other tests.
 """
 
 import json
@@ -47,7 +49,11 @@ def follow(tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.parametrize("kind", CONTACTS)
-def test_a_contact_starts_in_mixed_lubrication(follow, kind):
+def test_a_contact_starts_in_mixed_lubrication(follow, monkeypatch, request, kind):
+    for module in ("results.running", "transient.running"):
+        monkeypatch.setattr(f"asperity.{module}.PASSAGES", 4)  # not 6, on all cells
+    if kind != "line":
+        request.getfixturevalue("blank_figures")
     follow(kind)
     numbers = load_run(f"{kind}.nc").summary()
     assert MIXED[0] < numbers["clr"] < MIXED[1]
@@ -57,6 +63,7 @@ def test_a_contact_starts_in_mixed_lubrication(follow, kind):
     assert Path(f"{kind}.html").exists()
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_a_dry_contact_has_a_resonance_under_the_whole_load(follow):
     follow("dry")
     numbers = load_run("dry.nc").summary()
@@ -64,7 +71,7 @@ def test_a_dry_contact_has_a_resonance_under_the_whole_load(follow):
     assert numbers["crf_hz"] > 1000.0
 
 
-@pytest.mark.usefixtures("short_tracks", "thinnest_film_only")
+@pytest.mark.usefixtures("short_tracks", "thinnest_film_only", "blank_figures")
 @pytest.mark.parametrize("kind", MACHINES)
 def test_the_thinnest_film_of_a_machine_is_in_mixed_lubrication(follow, kind):
     conditions, _ = follow(kind).values()
@@ -88,8 +95,9 @@ def test_a_moving_contact_carries_load_on_asperities(follow):
     assert clr.max() - clr.min() > 0.1  # and it changes as the roughness moves
 
 
-@pytest.mark.usefixtures("short_tracks")
-def test_a_study_starts_in_full_film_and_ends_in_mixed_lubrication(follow):
+@pytest.mark.usefixtures("two_passages", "blank_figures")
+def test_a_study_starts_in_full_film_and_ends_in_mixed_lubrication(follow, monkeypatch):
+    monkeypatch.setattr("asperity.study.overview.MAX_MAPS", 1)  # contacts solved again to draw them
     follow("study")
     shares = load_study("study").table.groupby("surface.sq")["clr"].mean()
     assert shares.is_monotonic_increasing
@@ -98,6 +106,7 @@ def test_a_study_starts_in_full_film_and_ends_in_mixed_lubrication(follow):
 
 
 @pytest.mark.workers
+@pytest.mark.usefixtures("blank_figures")
 def test_wear_changes_the_load_share_within_seconds(follow):
     start = time.process_time()
     follow("wear")
@@ -106,6 +115,7 @@ def test_wear_changes_the_load_share_within_seconds(follow):
     assert shares[0] - shares[-1] > 0.05
 
 
+@pytest.mark.usefixtures("blank_figures")
 def test_tracking_finds_the_severe_stage_of_the_simulated_rig(follow):
     _, tracked = follow("track").values()
     assert tracked.startswith(("Alert: ", "Alarm: "))
@@ -113,10 +123,10 @@ def test_tracking_finds_the_severe_stage_of_the_simulated_rig(follow):
     assert Path("track.html").exists()
 
 
-@pytest.mark.usefixtures("short_tracks")
+@pytest.mark.usefixtures("two_passages", "coarse_search", "blank_figures")
 def test_inference_learns_the_load_share_of_the_simulated_rig(follow, monkeypatch):
     # of 24 solved on twice the cells
-    monkeypatch.setattr("asperity.inference.emulator.FINER_POINTS", 6)
+    monkeypatch.setattr("asperity.inference.emulator.FINER_POINTS", 2)
     _, inferred = follow("infer").values()
     assert Path("infer.html").exists()
     row = next(line for line in inferred.splitlines() if "asperity load share, CLR" in line)

@@ -9,6 +9,7 @@ import sys
 import time
 from contextlib import contextmanager
 from pathlib import Path
+from threading import Thread
 
 import pandas
 import pytest
@@ -27,33 +28,13 @@ SETTINGS = {
 WORDS = [word for key, value in SETTINGS.items() for word in ("--set", f"{key}={value}")]
 
 
-def run_study(out, *more):
-    command = [
-        sys.executable,
-        "-m",
-        "asperity",
-        "study",
-        str(CASE),
-        "--out",
-        str(out),
-        *WORDS,
-        *more,
-    ]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+def study_in(out, *more):
+    """Return the words of the command, with the table in `out`."""
+    return "study", str(CASE), "--out", str(out), *WORDS, *more
 
 
 def start_study(out, *more):
-    command = [
-        sys.executable,
-        "-m",
-        "asperity",
-        "study",
-        str(CASE),
-        "--out",
-        str(out),
-        *WORDS,
-        *more,
-    ]
+    command = [sys.executable, "-m", "asperity", *study_in(out, *more)]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
@@ -74,11 +55,13 @@ def wait_for(condition, seconds=60.0):
 
 @pytest.fixture(scope="module")
 def complete(tmp_path_factory):
+    """Return the rows of a study that one process computes without interruption."""
     out = tmp_path_factory.mktemp("complete")
-    done = run_study(out, "--workers", "2", "--json")
-    assert done.returncode == 0, done.stderr
-    assert all("s so far)" in line for line in done.stderr.splitlines())  # progress alone
-    result = json.loads(done.stdout)
+    running = start_study(out, "--workers", "1", "--json")
+    output, errors = running.communicate(timeout=120)
+    assert running.returncode == 0, errors
+    assert all("s so far)" in line for line in errors.splitlines())  # progress alone
+    result = json.loads(output)
     assert (result["cases"], result["failed"], result["table"]) == (
         24,
         0,
@@ -88,21 +71,22 @@ def complete(tmp_path_factory):
     return rows(out)
 
 
-def test_a_study_whose_parent_is_killed_resumes_to_the_same_table(complete, tmp_path):
-    running = start_study(tmp_path, "--workers", "2")
-    wait_for(lambda: part_files(tmp_path) >= 2)
+def test_a_study_whose_parent_is_killed_resumes_to_the_same_table(complete, asp, tmp_path):
+    out = tmp_path / "out"
+    running = start_study(out, "--workers", "2")
+    wait_for(lambda: part_files(out) >= 2)
     workers = subprocess.run(
         ["pgrep", "-P", str(running.pid)], capture_output=True, text=True, check=False
     ).stdout
     running.kill()
     running.communicate()
-    finished = part_files(tmp_path)
+    finished = part_files(out)
     wait_for(lambda: not any(Path(f"/proc/{pid}").exists() for pid in workers.split()), 20.0)
-    assert part_files(tmp_path) == finished
-    resumed = run_study(tmp_path, "--workers", "2", "--json")
-    assert resumed.returncode == 0, resumed.stderr
-    assert json.loads(resumed.stdout)["computed"] < 24
-    pandas.testing.assert_frame_equal(rows(tmp_path), complete, check_exact=True)
+    assert part_files(out) == finished
+    code, output, errors = asp(*study_in(out, "--workers", "1", "--json"))
+    assert code == 0, errors
+    assert json.loads(output)["computed"] < 24
+    pandas.testing.assert_frame_equal(rows(out), complete, check_exact=True)
 
 
 def test_a_study_survives_a_killed_worker(complete, tmp_path):
@@ -157,14 +141,20 @@ def dask_cluster(folder):
             process.wait()
 
 
-def test_a_killed_dask_worker_does_not_change_the_rows(complete, tmp_path):
+def test_a_killed_dask_worker_does_not_change_the_rows(complete, asp, tmp_path):
     out = tmp_path / "out"
-    with dask_cluster(tmp_path) as (address, workers):
-        running = start_study(out, "--executor", f"dask:{address}", "--json")
+
+    def kill(worker):
         wait_for(lambda: part_files(out) >= 2)
-        workers[0].kill()
-        output, errors = running.communicate(timeout=180)
-    assert running.returncode == 0, errors
+        worker.kill()
+
+    with dask_cluster(tmp_path) as (address, workers):
+        killing = Thread(target=kill, args=(workers[0],))
+        killing.start()
+        code, output, errors = asp(*study_in(out, "--executor", f"dask:{address}", "--json"))
+        killing.join()
+        assert workers[0].wait(10.0) == -signal.SIGKILL
+    assert code == 0, errors
     assert json.loads(output)["computed"] == 24
     pandas.testing.assert_frame_equal(rows(out), complete, check_exact=True)
 

@@ -13,6 +13,8 @@ COARSE = (
     "grid.cells=[32, 16]",
     "--set",
     "surface.correlation_length='50 um'",
+    "--set",
+    "wear.patches=3",
     "--workers",
     "1",
 )
@@ -52,7 +54,7 @@ def worn_case(tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_json_has_the_documented_keys(asp, worn_case):
+def test_json_has_the_documented_keys(asp, worn_case, request):
     code, out, err = asp(
         "wear",
         "wear.toml",
@@ -90,6 +92,7 @@ def test_json_has_the_documented_keys(asp, worn_case):
     assert {key: again[key] for key in ("sq_m", "clr", "crf_hz")} == {
         key: result[key] for key in ("sq_m", "clr", "crf_hz")
     }
+    request.getfixturevalue("blank_figures")  # those of w.html again
     code, out, _ = asp("report", "worn", "--json")
     assert code == 0
     assert json.loads(out)["wear"]["sq_m"] == result["sq_m"]

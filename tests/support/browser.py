@@ -21,6 +21,19 @@ ARGUMENTS = (
     "--no-sandbox",
     "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",  # no other host is found
 )
+ONE_WORKER = """
+import sys
+from asperity.app import jobs
+from asperity.cli import main
+assert jobs.MAX_WORKERS > 1
+jobs.MAX_WORKERS = 1
+main(sys.argv[1:])
+"""  # each worker loads the solver, which takes seconds of processor time
+NOT_WARMED_UP = f"""
+from asperity.app.jobs import WorkerPool
+WorkerPool.warm_up = lambda _: None
+{ONE_WORKER}
+"""  # the first job that solves a contact loads the solver
 
 
 def missing(reason: str) -> None:
@@ -31,13 +44,13 @@ def missing(reason: str) -> None:
 
 
 class Server:
-    """A running `asperity page`."""
+    """A running `asperity page`, with one worker process unless another program is given."""
 
     def __init__(
         self,
         folder: Path,
         *arguments: str,
-        program: tuple[str, ...] = ("-m", "asperity"),
+        program: tuple[str, ...] = ("-c", ONE_WORKER),
         **environment: str,
     ) -> None:
         self.log = folder / "server.log"
@@ -86,13 +99,13 @@ class Server:
 
 
 def write_small_contact(folder: Path, *, sliding: bool = False) -> str:
-    """Write the default case on few cells; return its name.
+    """Write the default case on few cells, with standing roughness; return its name.
 
-    Without sliding, its roughness stands still and the page computes no Stribeck curve.
+    Without sliding, the page computes no Stribeck curve; with sliding, the cells are too few for a
+    coarse solution.
     """
-    few = {"grid.cells": [96, 64], "solver.running_cells": 600}
-    if not sliding:
-        few |= {"contact.slip": 0.0, "contact.roughness": "standing"}
+    cells, slip = ([64, 48], 0.2) if sliding else ([96, 64], 0.0)
+    few = {"grid.cells": cells, "contact.slip": slip, "contact.roughness": "standing"}
     (folder / "contact.toml").write_text(default_case().with_overrides(few).text, "utf-8")
     return "contact.toml"
 
@@ -216,13 +229,41 @@ class Visit:
         page.get_by_text(re.compile("^(Loading the solver.*)?Solved on")).wait_for()
         return page
 
+    def require_no_error(self):
+        """Assert that no other host was asked and no error was reported."""
+        assert self.foreign == []
+        assert self.errors == []
+
     def close(self):
         """Close the page, and its context unless others use it; assert that nothing went wrong."""
         self.page.close()
         if self._alone:
             self.context.close()
-        assert self.foreign == []
-        assert self.errors == []
+        self.require_no_error()
+
+
+class SharedVisit(Visit):
+    """A solved contact for several tests, which leave the page as they found it.
+
+    Loading it takes the browser, the server and a worker five seconds of processor time.
+    """
+
+    def __init__(self, browser, server: Server, **window) -> None:
+        super().__init__(browser, server, **window)
+        self.solved()
+        self._first = self._shown()
+
+    def _shown(self) -> tuple[str, list[str], list[str]]:
+        """Return the address, the results in the strip, and the values of all inputs."""
+        boxes = self.page.get_by_role("textbox")
+        values = boxes.evaluate_all("boxes => boxes.map(box => box.value)")
+        return self.page.url, self.page.locator("#headline").all_inner_texts(), values
+
+    def as_first(self):
+        """Return the page as it was at first; load it again if a test left it changed."""
+        if self._shown() != self._first:
+            self.solved()
+        return self.page
 
 
 CONTROLS = {

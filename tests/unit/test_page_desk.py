@@ -68,7 +68,11 @@ class ImmediateQueue:
 
 @pytest.fixture(scope="module")
 def run():
-    return solve_case(papers_case().with_overrides(CELLS))
+    """Solve a contact with running roughness over 4 passages of the Hertz zone, not 6."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in ("results.running", "transient.running"):
+            patch.setattr(f"asperity.{module}.PASSAGES", 4)
+        return solve_case(papers_case().with_overrides({**CELLS, "solver.running_cells": 400}))
 
 
 @pytest.fixture(scope="module")
@@ -481,7 +485,8 @@ def test_the_exported_case_gives_the_same_numbers(tmp_path):
     )
 
 
-def test_the_report_is_the_report_page():
+def test_the_report_is_the_report_page(monkeypatch):
+    monkeypatch.setattr("asperity.report.base.svg", lambda _: "<svg/>")
     text = work.make_report(NO_SESSION, papers_case().with_overrides(MUTE), write_report)
     assert text.startswith("<!doctype html>")
     assert "Content-Security-Policy" in text

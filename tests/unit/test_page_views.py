@@ -1,6 +1,7 @@
 """Recordings, studies and histories on the page agree with the command line on the same files."""
 
 import os
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -90,7 +91,8 @@ def study(tmp_path_factory):
     case = papers_case().with_overrides(
         {**SMALL, "study": {"sq": ["0.5 um", "1.5 um"], "seeds": 2, "kind": "solve"}}
     )
-    run_study(plan_study(case), out=folder, workers=1)
+    with ThreadPoolExecutor(1) as executor:
+        run_study(plan_study(case), out=folder, executor=executor)
     return folder
 
 

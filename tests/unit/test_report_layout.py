@@ -9,7 +9,14 @@ from test_report import run_like
 
 from asperity.report import base, write_report
 from asperity.report.run import page
-from asperity.report.style import ACROSS_PAGE, CONTACT_COLOUR, FILM_COLOURS, IN_COLUMN, OIL_COLOUR
+from asperity.report.style import (
+    ACROSS_PAGE,
+    CONTACT_COLOUR,
+    FILM_COLOURS,
+    IN_COLUMN,
+    OIL_COLOUR,
+    svg,
+)
 from support.browser import chromium
 
 SCREENS = {1280: (800, 1), 390: (844, 2)}  # width: height of a screen, screens to the first picture
@@ -19,12 +26,24 @@ MIN_TEXT = 6.0  # points, of figures for a paper
 
 @pytest.fixture(scope="module")
 def reports(tmp_path_factory):
+    """Reports of one and of three runs. Each kind of figure is encoded once, in each size."""
+    encoded = {}
+
+    def encoded_once(figure):
+        labels = tuple((axes.get_xlabel(), axes.get_ylabel()) for axes in figure.axes)
+        kind = (labels, tuple(figure.get_size_inches()))
+        if kind not in encoded:
+            encoded[kind] = svg(figure)
+        return encoded[kind]
+
     folder = tmp_path_factory.mktemp("reports")
     runs = [run_like(sq=1e-6 * sq) for sq in (0.5, 1.0, 2.0)]
-    return {
-        1: write_report(runs[:1], folder / "one.html"),
-        3: write_report(runs, folder / "three.html"),
-    }
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(base, "svg", encoded_once)
+        return {
+            1: write_report(runs[:1], folder / "one.html"),
+            3: write_report(runs, folder / "three.html"),
+        }
 
 
 @pytest.fixture(scope="module")

@@ -136,6 +136,7 @@ class VisitPool:
         self.when_warm = worker_pool.when_warm
         self._connected = False
         self._waiting: list[tuple[Future[object], Callable[[], Future[object]]]] = []
+        self._when_connected: list[Callable[[], None]] = []
 
     @property
     def is_compiling(self) -> bool:
@@ -162,9 +163,15 @@ class VisitPool:
         self._waiting.append((outcome, submit))
         return outcome
 
+    def when_connected(self, callback: Callable[[], None]) -> None:
+        """Call a function when the browser connects, which it has not done yet."""
+        self._when_connected.append(callback)
+
     def connect(self) -> None:
         """Start the waiting jobs, and others at once from now on."""
         self._connected = True
+        for callback in self._when_connected:
+            callback()
         waiting, self._waiting = self._waiting, []
         for outcome, submit in waiting:
             submit().add_done_callback(partial(_copy_outcome, outcome))

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 import pandas
 import scipy
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from asperity.case import Case
 from asperity.core.arrays import Field, usual_float_errors
@@ -55,8 +55,7 @@ class WearCurve(Brief):
             raise BadInput(
                 f"the study has no column {quantity!r}; it has {', '.join(self.table.columns)}"
             )
-        valid = (self.table["status"] == DONE) & (self.table[SQ_KEY] == self.sq[level])
-        values = self.table.loc[valid, quantity].to_numpy(dtype=float)
+        values = self.table[quantity].iloc[self._rows[level]].to_numpy(dtype=float)
         return np.asarray(values[np.isfinite(values)])
 
     def by_case(self, quantity: str) -> tuple[Field, Field]:
@@ -168,6 +167,12 @@ class WearCurve(Brief):
         """Return half the width of Student's interval of the mean, shape (levels,)."""
         counts = np.array([values.size for values in self._by_level(quantity)])
         return student_half_width(self.std(quantity), counts, level)
+
+    @cached_property
+    def _rows(self) -> list[NDArray[np.intp]]:
+        """Positions of each level's valid cases in the table."""
+        valid, sq = (self.table["status"] == DONE).to_numpy(), self.table[SQ_KEY].to_numpy()
+        return [np.flatnonzero(valid & (sq == level)) for level in self.sq]
 
     def _by_level(self, quantity: str) -> list[Field]:
         return [self.values(quantity, level) for level in range(self.sq.size)]

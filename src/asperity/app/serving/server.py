@@ -36,7 +36,7 @@ from asperity.core.errors import BadInput
 PORT = 5006
 FOLDER_CHECK_MS, FRAME_MS = 5000, 250  # intervals of folder checks, and of frames of a history
 CONNECTION_CHECK_MS = 50  # interval, until the browser of a visit is connected
-READY_MS = 4000  # figures are created after this time even without a ready event
+READY_MS = 4000  # figures are created after this time of a connection even without a ready event
 UNUSED_MS = 120_000  # lifetime of a session before its browser connects
 PING_S = 120  # interval of keep-alive pings, and the time to answer
 HTTP_LIMITS = {  # sizes [bytes], and times [s] after which a silent connection is closed
@@ -95,9 +95,10 @@ class PageSite:
 
     def contact(self) -> Any:
         """Create the page of a contact for one visit."""
+        pool, document = self._visit_pool(), _document()
         view = contact.ContactView(
             Settings(self.opened.case, preset=self.opened.preset),
-            self._visit_pool(),
+            pool,
             _callback_scheduler(),
             _address(),
             self.tools,
@@ -105,11 +106,11 @@ class PageSite:
         )
         parts, sections = contact.layout(view)
         view.begin(_query(), self.opened.result)
-        _document().on_event("document_ready", lambda _event: view.create_next_figure())
-        _document().add_timeout_callback(
-            view.create_next_figure, READY_MS
+        document.on_event("document_ready", lambda _event: view.create_next_figure())
+        pool.when_connected(
+            partial(document.add_timeout_callback, view.create_next_figure, READY_MS)
         )  # in case the event never arrives
-        _document().js_on_event("document_ready", view.stale_mark.update_page)
+        document.js_on_event("document_ready", view.stale_mark.update_page)
         panel.state.on_session_destroyed(lambda _context: view.close())
         return self._page("contact", "Contact", parts, sections, headline=view.strip.html)
 
