@@ -7,7 +7,7 @@ import pytest
 
 from asperity.ehl import Options, solve_contact
 from asperity.ehl import solve as solving
-from asperity.ehl.controls import ELASTIC_DRY
+from asperity.ehl.controls import DRY
 from asperity.ehl.models import elastic_dry as elastic
 from asperity.ehl.strategies.grid_continuation import Search
 from support.paper import contact, grid, rough
@@ -62,7 +62,7 @@ def test_plastic_contacts_and_failed_conjugate_gradients_fall_back_to_newton(mon
     )
     solve_contact(contact(hardness=2e9), None, surface)
     assert calls == []
-    monkeypatch.setattr(elastic, "ELASTIC_DRY", replace(ELASTIC_DRY, max_krylov_steps=3))
+    monkeypatch.setattr(elastic, "DRY", replace(DRY, max_krylov_steps=3))
     found = solve_contact(contact(), None, surface, options=TIGHT)
     assert len(calls) == 1
     np.testing.assert_array_equal(found.pressure, expected.pressure)

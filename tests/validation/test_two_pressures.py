@@ -14,7 +14,7 @@ from asperity.case import load_case
 from asperity.contact.grid import Grid
 from asperity.ehl import Options, solve_contact
 from asperity.ehl import solve as solving
-from asperity.ehl.controls import ELASTIC_DRY, MIXED_SOLVER, RESIDUALS
+from asperity.ehl.controls import DRY, PRECONDITIONER, RESIDUALS
 from asperity.ehl.grid_design import auto_grid
 from asperity.ehl.linear_solvers.mixed import MixedLinear, extend_lubrication, is_firm
 from asperity.ehl.load_shares import carried_share
@@ -171,7 +171,7 @@ def test_a_dry_start_by_active_sets_agrees_with_newton(sq, monkeypatch):
 def test_a_dry_start_falls_back_on_newton_if_active_sets_fail(monkeypatch):
     problem = contact_problem(contact(hardness=2e9), barus(), rough(grid((64, 64)), 1e-6), MIXED)
     expected = dry_start(problem)
-    monkeypatch.setattr(dry, "ELASTIC_DRY", replace(ELASTIC_DRY, max_active_sets=1))
+    monkeypatch.setattr(dry, "DRY", replace(DRY, max_rounds=1))
     found = dry_start(problem)
     assert found[1] != expected[1]
     assert found[1] == pytest.approx(expected[1], abs=0.01)
@@ -440,6 +440,6 @@ def test_blocks_are_nested_for_firm_contacts_and_not_for_nearly_closed_films():
         rng=np.random.default_rng(sample.seed),
     )
     hard = solve_contact(sample.conditions, sample.oil, surface)
-    assert min(*soft.grid.cells, *grid.cells) >= MIXED_SOLVER.min_multigrid_cells
+    assert min(*soft.grid.cells, *grid.cells) >= PRECONDITIONER.max_coarse_cells
     assert is_firm(balance_of(soft))
     assert not is_firm(balance_of(hard))

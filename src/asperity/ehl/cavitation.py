@@ -99,7 +99,7 @@ def solve_film(
     viscosity: float | ViscosityLaw,
     density: DensityLaw | None = None,
     boundary: FilmBoundary = FLOODED,
-    tolerance: float = RIGID_FILM.tolerance,
+    tolerance: float = 1e-11,
     strict: bool = True,
 ) -> FilmSolution:
     """Solve pressure and content of the oil in a given gap with mass-conserving cavitation.
@@ -168,7 +168,7 @@ def _solve_newton(channel: "RoughChannel", tolerance: float) -> tuple[Field, "Fl
         stagnation += 1
         if residual < 0.9 * best:
             best, stagnation, damping = residual, 0, min(1.0, 1.5 * damping)
-        elif stagnation == RIGID_FILM.stagnation_iterations:  # damp alternating cells
+        elif stagnation == STEP_LIMITS.stagnation_iterations:  # damp alternating cells
             best, stagnation, damping = residual, 0, max(0.5 * damping, STEP_LIMITS.min_damping)
         signed = signed + damping * channel.limit_step(signed, -_newton_step(flows))
         steps += 1

@@ -14,8 +14,8 @@ class Residuals:
     initial_guess: float = 0.1  # a result with more is no initial guess for the next grid
     # of the first-order wedge or the dry contact, before the equations solved
     rough_solution: float = 1e-2
-    coarse_grid: float = 1e-3  # of a coarser grid, whose solution only has to be a good guess
     divergence: float = 10.0  # ratio to the initial residual from which steps seldom recover
+    coarse_grid: float = 1e-3  # of a coarser grid, whose solution only has to be a good guess
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,41 +32,31 @@ class StepLimits:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SinglePressureNewton:
-    """Newton iteration of the single-pressure model."""
-
-    time_step_residual: float = 0.05  # below it pseudo-time steps grow
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class MixedNewton:
     """Newton iteration of the mixed model."""
 
-    min_content_share: float = 0.2  # of its content that a ruptured cell keeps in one step
     state_offset: float = 1e-9  # beyond a state's bound, puts a cell into the next state
     line_search_residual: float = 0.03  # below it a step that increases the residual is halved
     max_residual_growth: float = 1.5  # of a step that is not halved
-    # with exact face mobilities, of one step:
-    max_film_decrease: float = 0.8  # in a cell's film ...
-    closing_film: float = 0.5  # ... and, in a time step, this share of the rms roughness
-    max_pressure_change: float = 2.0  # in a cell's pressure, or in p_h if that is more
+    # of one step: in the content of a ruptured cell and, with exact face mobilities, in the film
+    # (in a time step plus the rms roughness) ...
+    max_film_decrease: float = 0.8
+    max_pressure_change: float = 2.0  # ... and in the pressure, or in p_h if that is more
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MixedLinearSolver:
     """Linear solver of the mixed model's Newton steps; `KrylovMethod` has the usual tolerance."""
 
-    # for exact face mobilities near the solution, whose rows differ by more; and for conserved oil
-    # between bodies that touch nowhere, if their film is a small difference of far larger
-    # deflections (`thin_film`, a²/R): the cavity's equations dominate the residual
+    # close to the solution for exact face mobilities, whose rows differ by more, and for oil
+    # conserved along its path; and for conserved oil between bodies that touch nowhere, if their
+    # film is a small difference of far larger deflections (`thin_film`, a²/R): the cavity's
+    # equations dominate the residual
     tolerance_close: float = 1e-2
     thin_film: float = 1e-3
-    tolerance_conserving: float = 3e-3  # for oil conserved along its path ...
-    conserving_residual: float = 3e-2  # ... from this residual on: the mass balance is met closer
     # in a time step the residual, between `tolerance_close` and this one: closer steps far from the
     # solution are not better ones
     max_tolerance_time_step: float = 0.3
-    min_multigrid_cells: int = 64  # along both axes, from which multigrid replaces sparse LU
     # share of the flattened cells: fewer nearly closed ones make the contact firm
     max_nearly_closed: float = 0.1
 
@@ -75,11 +65,11 @@ class MixedLinearSolver:
 class Preconditioner:
     """Approximate inverse of the linearised equations."""
 
-    max_coarse_cells: int = 64  # along each axis of the grid that is factored
+    # along each axis of a grid that is factored; multigrid needs as many along both
+    max_coarse_cells: int = 64
     min_halved_cells: int = 12  # along an axis that multigrid still halves
     cycles: int = 2  # of coarse correction and line relaxation on each level
     min_pivot: float = 0.02  # in its row's entries along x; keeps elimination stable
-    min_mobility: float = 1e-30  # in the largest: smaller ones are zero in single precision
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,8 +77,7 @@ class KrylovMethod:
     """GMRES and its variant with a frequency."""
 
     tolerance: float = 0.1  # relative residual: an inexact Newton method
-    max_steps: int = 60
-    initial_vectors: int = 7  # allocated at first
+    max_steps: int = 100
     reorthogonalise: float = 0.5  # share of a vector left, below which it is orthogonalised again
     stagnation: float = 0.9  # residual ratio of a step above which the basis vector continues
 
@@ -97,34 +86,18 @@ class KrylovMethod:
 class Oscillation:
     """Linear response of an oscillating contact."""
 
-    max_krylov_steps: int = 200  # of one round of GMRES
     round_tolerance: float = 3e-5  # relative residual of a round: the limit of single precision
-    max_rounds: int = 12
-    # residual ratio of a round above which the next one is in double precision ...
-    stagnation: float = 0.3
-    stagnation_of_tolerance: float = 1.5  # ... or this multiple of its tolerance, if that is more
-    # flow under a cell's own pressure over Couette transport of its film, below which oil is stiff
-    stiff_flow_ratio: float = 1.0
+    stagnation: float = 0.3  # residual ratio above which the next round is in double precision
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ElasticDry:
-    """Active-set method for dry elastic bodies."""
+class DryContact:
+    """Active sets and conjugate gradients for dry bodies."""
 
     max_krylov_steps: int = 1000  # of conjugate gradients, in all
-    max_active_sets: int = 30  # in one window
-    max_windows: int = 8
+    max_rounds: int = 30  # of active sets, of windows around them, of redistributed load
     window_margin: int = 32  # a window adds one in so many of all lines on either side
-    tolerance: float = 1e-3  # relative residual of conjugate gradients once the set is stable
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PlasticDry:
-    """Active-set method and projected conjugate gradients for dry elastic-plastic bodies."""
-
-    tolerance: float = 1e-4  # residual of projected conjugate gradients
-    max_steps: int = 300  # of projected conjugate gradients
-    max_load_corrections: int = 40  # rounds that redistribute load cut off by the bounds
+    tolerance: float = 1e-4  # residual of conjugate gradients once the set is stable
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,8 +106,7 @@ class LocalRefinement:
 
     worst_residual: float = 0.05  # in the largest residual: cells that belong to a box
     max_box_share: float = 0.25  # of the grid's cells: larger boxes do not pay
-    margin: int = 6  # cells around the worst ones in a box ...
-    fixed_margin: int = 2  # ... of which the outer ones are fixed
+    margin: int = 6  # cells around the worst ones in a box, of which the outer third is fixed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -144,7 +116,6 @@ class GridContinuation:
     # where another way is left: on a coarser grid, at one approach while it is bracketed, of the
     # second-order wedge, of a roller's third-order wedge, in a time step
     max_iterations: int = 40
-    elastic_tolerance: float = 0.1  # of dry elastic bodies, in that of the Newton step after it
     min_coarse_inlet_cells: float = 2.0  # across the inlet of a line contact: else it closes
 
 
@@ -152,7 +123,6 @@ class GridContinuation:
 class MixedSearchControls:
     """Strategies of the mixed model."""
 
-    max_roller_work: float = 1.25  # all steps on all grids, in the allowed work on the finest one
     # of the first-order wedge from a distant guess, and of exact face mobilities from arithmetic
     # means
     max_long_iterations: int = 80
@@ -162,7 +132,6 @@ class MixedSearchControls:
     # sum of gains and losses over the throughflow, if conserving ...
     max_imbalance: float = 1e-6
     imbalance_to_tolerance: float = 1e-2  # ... or this share of the tolerance, if that is more
-    rounding: float = 1e-12  # residual that is rounding: in a wide inlet it is much oil
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -170,8 +139,8 @@ class TimeMarching:
     """Implicit time steps towards a steady state; lengths are the oil's path in one step."""
 
     tolerance: float = 5e-2  # of one step
-    max_newton_steps: int = 10  # in one step
-    max_steps: int = 60
+    max_newton_steps: int = 10  # in one step; beyond it shorter ones are faster
+    max_steps: int = 1000  # a nearly flooded meniscus moves slowly
     final_length: float = 3.0  # half-widths; the last step is at least as long
     min_length: float = 0.05  # in the first step: shorter ones do not help
 
@@ -182,11 +151,8 @@ class Meniscus:
 
     front: float = 4.0  # gap at the initial meniscus, in the layer's thickness ...
     front_film: float = 2.0  # ... or in the central film, if that is more
-    first_length: float = 0.5  # the oil's path in one step, in half-widths ...
-    min_length: float = 1e-3
+    first_length: float = 0.5  # the oil's path in one step, in half-widths
     forcing: float = 0.1  # mass imbalance of a time step, in that of the steady equations before it
-    max_newton_steps: int = 15  # in one time step; beyond it shorter time steps are faster
-    max_time_steps: int = 1000  # a nearly flooded meniscus moves slowly
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -195,20 +161,16 @@ class RigidFilm:
 
     max_steps: int = 200
     max_log_viscosity_step: float = 1.0  # change of log viscosity in one cell and step
-    stagnation_iterations: int = 4  # without a decrease, until steps are halved
-    tolerance: float = 1e-11  # largest imbalance of a cell, in the flow
 
 
 RESIDUALS = Residuals()
 STEP_LIMITS = StepLimits()
-NEWTON = SinglePressureNewton()
 MIXED_NEWTON = MixedNewton()
 MIXED_SOLVER = MixedLinearSolver()
 PRECONDITIONER = Preconditioner()
 KRYLOV = KrylovMethod()
 OSCILLATION = Oscillation()
-ELASTIC_DRY = ElasticDry()
-PLASTIC_DRY = PlasticDry()
+DRY = DryContact()
 REFINEMENT = LocalRefinement()
 CONTINUATION = GridContinuation()
 SEARCH = MixedSearchControls()

@@ -12,7 +12,7 @@ from asperity.contact.grid import Grid
 from asperity.core.arrays import Field, usual_float_errors
 from asperity.core.errors import BadInput, NotConverged
 from asperity.ehl.contact_solution import ContactSolution
-from asperity.ehl.controls import CONTINUATION, RESIDUALS, SEARCH
+from asperity.ehl.controls import RESIDUALS
 from asperity.ehl.far_pressure import build_up_lengths
 from asperity.ehl.film_formulas import central_film, require_thin_film
 from asperity.ehl.models.elastic_dry import elastic_contact
@@ -160,8 +160,6 @@ def solve_mixed(
     search = MixedSearch(options, scales.gap, progress)
     if start is not None and start.convergence.attempt == SolveStrategy.ARITHMETIC_MEANS:
         search.arithmetic, finest = True, replace(finest, exact=False)
-    if conditions.geometry == "roller":
-        search.most_work = SEARCH.max_roller_work * options.max_iterations * finest.roughness.size
     if start is not None:
         strategy, unknowns = SolveStrategy.COARSE_TO_FINE, pressures_of(start, finest, scales)
         if options.inlet_layer is None:
@@ -251,7 +249,7 @@ def _solve_cold(
             if finest.exact:
                 search.options, search.is_guess = options, False
                 step = search.solve_again(search.solved)
-        if search.converged(options.tolerance) or search.exhausted:
+        if search.converged(options.tolerance):
             break
     search.options = options
     return strategy, step
@@ -286,9 +284,7 @@ class ElasticSearch(Search):
             tolerance = self.level_tolerance(finest=finest)
             if problem.cells != pressure.shape:
                 pressure = problem.interpolate(pressure)
-            pressure, dry_approach, converged = elastic_contact(
-                problem, pressure, CONTINUATION.elastic_tolerance * tolerance
-            )
+            pressure, dry_approach, converged = elastic_contact(problem, pressure, tolerance)
             if not converged:
                 return super().solve_levels(levels, start, approach, fixed=False)
             step = self.run(

@@ -16,6 +16,7 @@ from asperity.ehl.controls import KRYLOV
 Vector: TypeAlias = np.ndarray
 Operator = Callable[[Vector], Vector]
 
+INITIAL_VECTORS = 7  # allocated at first
 ADJOINT = 2  # BLAS code of the conjugate transpose
 
 
@@ -57,7 +58,7 @@ def gmres(
     if norm == 0.0:
         return np.zeros_like(rhs)
     workspace = workspace or Workspace()
-    basis, corrections = workspace.rows(min(KRYLOV.initial_vectors, max_steps) + 1, rhs)
+    basis, corrections = workspace.rows(min(INITIAL_VECTORS, max_steps) + 1, rhs)
     projection = _Projection(norm, max_steps, np.result_type(rhs.dtype, float))
     count = 0
     np.divide(rhs, norm, out=basis[0])

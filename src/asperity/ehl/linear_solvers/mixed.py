@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from asperity.core.arrays import Field, Mask
-from asperity.ehl.controls import KRYLOV, MIXED_SOLVER, RESIDUALS, STEP_LIMITS
+from asperity.ehl.controls import KRYLOV, MIXED_SOLVER, PRECONDITIONER, RESIDUALS, STEP_LIMITS
 from asperity.ehl.linear_solvers.gmres import Workspace, gmres
 from asperity.ehl.linear_solvers.single_pressure import (
     BlockSolver,
@@ -110,7 +110,7 @@ class MixedLinear:
         weight = np.where(self.full & self.lubricated, 1.0 / self.rows.fluid_scale, self.real(0.0))
         multigrid = (
             not self.follows_wedge
-            and min(self.cells) >= MIXED_SOLVER.min_multigrid_cells
+            and min(self.cells) >= PRECONDITIONER.max_coarse_cells
             and (self.with_limiter or is_firm(self.balance))
         )
         blocks = (MultigridSolver if multigrid else BlockSolver)(stencil, weight)
@@ -410,14 +410,12 @@ def _known_changes(linear: MixedLinear) -> tuple[Field, Field]:
 def _linear_tolerance(linear: MixedLinear) -> float:
     """Return the tolerance of GMRES."""
     balance, residual = linear.balance, linear.balance.residual_rms
-    if balance.problem.conserve:
-        if linear.lagrangian and residual < MIXED_SOLVER.conserving_residual:
-            return MIXED_SOLVER.tolerance_conserving
-        if not linear.lagrangian and has_thin_film(balance):
-            return MIXED_SOLVER.tolerance_close
-    if balance.problem.exact and balance.problem.past is not None:
+    conserve, exact = balance.problem.conserve, balance.problem.exact
+    if conserve and not linear.lagrangian and has_thin_film(balance):
+        return MIXED_SOLVER.tolerance_close
+    if exact and balance.problem.past is not None:
         least, largest = MIXED_SOLVER.tolerance_close, MIXED_SOLVER.max_tolerance_time_step
         return min(max(least, residual), largest)
-    if balance.problem.exact and residual < RESIDUALS.initial_guess:
+    if (exact or (conserve and linear.lagrangian)) and residual < RESIDUALS.initial_guess:
         return MIXED_SOLVER.tolerance_close
     return KRYLOV.tolerance

@@ -251,14 +251,15 @@ def _block_size(cells: int) -> int:
 
 def single_faces(faces: Faces, dtype: Precision = np.float32) -> Faces:
     """Convert faces to another precision, with values that would be denormal set to zero."""
-    least = PRECONDITIONER.min_mobility * float(max(faces.east.max(), faces.north.max()))
+    single = np.finfo(np.float32)
+    least = float(single.tiny / single.eps) * float(max(faces.east.max(), faces.north.max()))
     # the same array may stand for several parts
     fields = {id(part): part for part in faces if isinstance(part, np.ndarray) and part.ndim == 2}
-    single = dict(zip(fields, np.empty((len(fields), *faces.east.shape), dtype), strict=True))
+    converted = dict(zip(fields, np.empty((len(fields), *faces.east.shape), dtype), strict=True))
     for number, part in fields.items():
-        reynolds.convert_precision(single[number], part, least)
+        reynolds.convert_precision(converted[number], part, least)
     inlet = np.where(faces.inlet > least, faces.inlet, 0.0).astype(dtype)
-    parts = [single.get(id(part), part) for part in faces]
+    parts = [converted.get(id(part), part) for part in faces]
     return Faces._make(parts)._replace(inlet=inlet, wedge=faces.wedge.astype(dtype))
 
 

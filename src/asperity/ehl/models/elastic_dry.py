@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.core.arrays import Field, Mask
-from asperity.ehl.controls import ELASTIC_DRY, KRYLOV
+from asperity.ehl.controls import DRY, KRYLOV
 from asperity.ehl.deflection import Deflection
 from asperity.ehl.models.single_pressure import Problem
 
@@ -38,7 +38,7 @@ class _ContactLines(NamedTuple):
 
     def window(self, touching: Mask) -> tuple["_ContactLines", slice]:
         """Return the touching lines with a margin."""
-        margin = self.undeformed.shape[0] // ELASTIC_DRY.window_margin
+        margin = self.undeformed.shape[0] // DRY.window_margin
         lines = np.flatnonzero(touching.any(axis=1))
         window = slice(max(lines[0] - margin, 0), lines[-1] + 1 + margin)
         undeformed = self.undeformed[window]
@@ -70,8 +70,8 @@ def elastic_contact(
     contact = _ContactLines.from_problem(problem)
     pressure = np.where(contact.inside, np.maximum(pressure, 0.0), 0.0)
     pressure *= contact.load / pressure.sum()
-    steps = ELASTIC_DRY.max_krylov_steps
-    for _ in range(ELASTIC_DRY.max_windows):
+    steps = DRY.max_krylov_steps
+    for _ in range(DRY.max_rounds):
         gap, approach, residual = contact.state(pressure)
         if residual < tolerance or steps <= 0:
             break
@@ -88,7 +88,7 @@ def _solve_window(
 ) -> tuple[Field, int]:
     """Return non-negative pressures on some lines, and the number of conjugate-gradient steps."""
     steps, previous = 0, pressure > 0.0
-    for _ in range(ELASTIC_DRY.max_active_sets):
+    for _ in range(DRY.max_rounds):
         gap, _, residual = lines.state(pressure)
         if residual < tolerance or steps >= max_steps:
             break
@@ -99,7 +99,7 @@ def _solve_window(
             settled[touching] += (lines.load - settled.sum()) / count
             gap = lines.undeformed + lines.deflection(settled)
         changing = np.any(touching != previous)
-        reduction = KRYLOV.tolerance if changing else ELASTIC_DRY.tolerance
+        reduction = KRYLOV.tolerance if changing else DRY.tolerance
         reduction = max(reduction, 0.2 * tolerance / residual)
         change, _, inner = level_gaps(lines.deflection, touching, gap, reduction, max_steps - steps)
         pressure, previous, steps = settled + change, touching, steps + inner

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.core.arrays import Field, Mask
-from asperity.ehl.controls import ELASTIC_DRY, KRYLOV, PLASTIC_DRY, STEP_LIMITS
+from asperity.ehl.controls import DRY, KRYLOV, STEP_LIMITS
 from asperity.ehl.deflection import Deflection
 from asperity.ehl.models.elastic_dry import level_gaps
 from asperity.ehl.models.single_pressure import Problem
@@ -66,14 +66,14 @@ def active_set_dry(
     inside, cap = sets.inside, sets.cap
     furthest = STEP_LIMITS.max_approach_step * max(1.0, float(np.std(problem.roughness)))
     pressure = np.where(inside, np.clip(pressure, 0.0, cap), 0.0).astype(np.float32)
-    for number in range(ELASTIC_DRY.max_active_sets + 1):
+    for number in range(DRY.max_rounds + 1):
         gap = sets.undeformed + sets.deflection(pressure) + np.float32(approach)
         touching = gap * sets.stiffness
         load_missing = abs(float(pressure.sum(dtype=float)) / sets.load - 1.0)
         converged = max(_residual(pressure, touching, cap, inside), load_missing) < tolerance
         capped = inside & (pressure - cap > touching)
         free = inside & (pressure > touching) & ~capped
-        if converged or number == ELASTIC_DRY.max_active_sets or not free.any():
+        if converged or number == DRY.max_rounds or not free.any():
             break
         pressure, level = sets.solve_free(pressure, capped, free)
         approach += float(np.clip(-level - approach, -furthest, furthest))
@@ -89,7 +89,7 @@ def _residual(pressure: Field, touching: Field, cap: float | np.float32, inside:
 
 
 def dry_contact(
-    problem: Problem, pressure: Field, *, max_steps: int = PLASTIC_DRY.max_steps
+    problem: Problem, pressure: Field, *, max_steps: int = DRY.max_krylov_steps
 ) -> tuple[Field, float, bool]:
     """Solve the dry contact by projected conjugate gradients from an initial guess.
 
@@ -104,7 +104,7 @@ def dry_contact(
     keep = False
     for step in range(max_steps + 1):
         gap, approach, free = _level_gap(problem, pressure, inside)
-        converged = _residual(pressure, gap * stiffness, cap, inside) < PLASTIC_DRY.tolerance
+        converged = _residual(pressure, gap * stiffness, cap, inside) < DRY.tolerance
         if converged or step == max_steps:
             break
         steepest = np.where(free, gap, 0.0)
@@ -150,7 +150,7 @@ def _scale_to_load(problem: Problem, pressure: Field) -> Field:
     inside = np.broadcast_to(~problem.rim, problem.cells)
     pressure = np.where(inside, np.clip(pressure, 0.0, cap), 0.0)
     target = problem.load / (dx * dy)
-    for _ in range(PLASTIC_DRY.max_load_corrections):
+    for _ in range(DRY.max_rounds):
         load_missing = target - float(pressure.sum())
         if abs(load_missing) <= 1e-12 * target:
             break

@@ -152,9 +152,7 @@ def _largest_share(step: Pressures, balance: MixedBalance) -> float:
     """
     problem, gap, free = balance.problem, balance.gap, balance.solid == FREE
     d_gap = problem.deflection(step.total) + step.approach
-    film = gap
-    if problem.past is not None:
-        film = gap + MIXED_NEWTON.closing_film * float(np.std(problem.roughness))
+    film = gap if problem.past is None else gap + float(np.std(problem.roughness))
     film_decrease = np.where(free & (gap > problem.contact_gap), -d_gap / film, 0.0).max()
     pressure_change = np.max(np.abs(step.total) / np.maximum(1.0, balance.unknowns.total))
     tiny = np.finfo(float).tiny
@@ -199,9 +197,8 @@ def _updated_oil(balance: MixedBalance, step: Field) -> Field:
     ruptured = current < 0.0
     pressed = current > cap
     full = ~ruptured & ~pressed
-    signed = np.where(
-        ruptured, np.maximum(signed, MIXED_NEWTON.min_content_share * (1.0 + current) - 1.0), signed
-    )
+    least = (1.0 - MIXED_NEWTON.max_film_decrease) * (1.0 + current) - 1.0
+    signed = np.where(ruptured, np.maximum(signed, least), signed)
     signed = np.where(ruptured & (signed >= 0.0), 0.0, signed)
     signed = np.where(full & (signed < 0.0), -MIXED_NEWTON.state_offset, signed)
     signed = np.where(full & (signed > cap), cap * (1.0 + MIXED_NEWTON.state_offset), signed)

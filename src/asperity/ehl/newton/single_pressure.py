@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.core.arrays import Field
-from asperity.ehl.controls import KRYLOV, NEWTON, STEP_LIMITS
+from asperity.ehl.controls import KRYLOV, RESIDUALS, STEP_LIMITS
 from asperity.ehl.linear_solvers.gmres import Operator, gmres
 from asperity.ehl.linear_solvers.single_pressure import Linear
 from asperity.ehl.models.mixed import MixedBalance
@@ -73,7 +73,7 @@ def newton(
         storing = (
             damping.storing
             / problem.spacing[0]
-            * min(1.0, balance.residual_rms / NEWTON.time_step_residual)
+            * min(1.0, balance.residual_rms / RESIDUALS.initial_guess)
         )
         d_pressure, d_approach = newton_step(balance, storing=storing, fixed=fixed)
         change = float(np.mean(np.abs(d_pressure)) / mean_pressure)

@@ -46,7 +46,6 @@ class Search:
         self.smooth = False  # bodies without roughness
         self.order = 1 if options.model == CONSERVING else 2  # of the wedge
         self.failed = False
-        self.work, self.most_work = 0.0, np.inf  # cells times steps
 
     @property
     def discretisation_error(self) -> GridError | None:
@@ -58,11 +57,6 @@ class Search:
             by_first_order=self.by_first_order,
             order=self.order,
         )
-
-    @property
-    def exhausted(self) -> bool:
-        """True if the allowed work is used up."""
-        return self.work >= self.most_work
 
     def converged(self, tolerance: float, *, check_load: bool = True) -> bool:
         """Return True if the last step met the tolerance in residual, change and load.
@@ -177,7 +171,6 @@ class Search:
                 self.converged(tolerance, check_load=check_load)
                 or step.number >= max_steps
                 or self.failed
-                or self.exhausted
             ):
                 break
             if step.balance.residual_rms > largest_residual:
@@ -293,7 +286,6 @@ class Search:
         residuals = balance.residual_rms, abs(balance.load_error), step.change
         iteration = Iteration(problem.all_cells, step.number, *residuals)
         self.history.append(iteration)
-        self.work += problem.roughness.size if step.number > 0 else 0
         if self.progress:
             self.progress(iteration)
 

@@ -81,15 +81,12 @@ def _subproblem(balance: MixedBalance, box: Box) -> tuple[Problem, Pressures]:
     (dx, dy) = problem.spacing
     start = Pressures(balance.unknowns.oil[box], balance.unknowns.total[box], 0.0)
     fixed = np.ones(start.total.shape, dtype=bool)
-    inner = slice(REFINEMENT.fixed_margin, -REFINEMENT.fixed_margin)
+    fixed_margin = REFINEMENT.margin // 3
+    inner = slice(fixed_margin, -fixed_margin)
     mirror = problem.mirror if across.stop == problem.cells[1] else 0
     fixed[
         inner,
-        slice(None)
-        if problem.form.periodic
-        else slice(REFINEMENT.fixed_margin, None)
-        if mirror
-        else inner,
+        slice(None) if problem.form.periodic else slice(fixed_margin, None) if mirror else inner,
     ] = False
     factor = problem.viscosity_factor
     subproblem = replace(

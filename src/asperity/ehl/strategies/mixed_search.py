@@ -38,8 +38,7 @@ class MixedSearch(ExactFaceSearch):
 
     def converged(self, tolerance: float, *, check_load: bool = True) -> bool:
         """Return True if the last step met the tolerance; if last, with conserved oil balanced."""
-        rounding = self.history[-1].residual < SEARCH.rounding
-        closely = tolerance <= self.options.tolerance and not rounding
+        closely = tolerance <= self.options.tolerance
         allowed = max(SEARCH.max_imbalance, SEARCH.imbalance_to_tolerance * tolerance)
         return super().converged(tolerance, check_load=check_load) and (
             self.imbalance <= min(self.max_imbalance, allowed if closely else np.inf)
@@ -235,13 +234,8 @@ class MixedSearch(ExactFaceSearch):
         max_steps = min(MARCHING.max_newton_steps, self.options.max_iterations)
         for _ in range(MARCHING.max_steps):
             stepped = replace(problem, past=implicit_step(problem, length, content))
-            step = self.run(
-                stepped,
-                newton(stepped, unknowns, second_order=False),
-                tolerance,
-                max_steps,
-                divergence=RESIDUALS.divergence,
-            )
+            steps = newton(stepped, unknowns, second_order=False)
+            step = self.run(stepped, steps, tolerance, max_steps)
             if self.converged(tolerance):
                 unknowns = unknowns_of(step)
                 content = step.balance.content
@@ -271,8 +265,7 @@ class MixedSearch(ExactFaceSearch):
         roughly = RESIDUALS.coarse_grid
         step = self.run(refilled, steps, roughly, CONTINUATION.max_iterations)
         steps = newton(problem, unknowns_of(step), second_order=False)
-        limits = (self.options.tolerance, CONTINUATION.max_iterations)
-        return self.run(problem, steps, *limits, divergence=RESIDUALS.divergence)
+        return self.run(problem, steps, self.options.tolerance, CONTINUATION.max_iterations)
 
     def coarse_to_fine(
         self, levels: Sequence[Problem], guess: Callable[[Problem], tuple[Field, float]]

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from asperity.ehl.contact_solution import ContactSolution
-from asperity.ehl.controls import MENISCUS, RESIDUALS, SEARCH
+from asperity.ehl.controls import MARCHING, MENISCUS, RESIDUALS, SEARCH
 from asperity.ehl.inlet_layer import InletLayer
 from asperity.ehl.models.mixed import Pressures, evaluate
 from asperity.ehl.models.single_pressure import Problem
@@ -44,9 +44,9 @@ def march_to_steady(search: MixedSearch, problem: Problem, unknowns: Pressures) 
     length, tolerance = MENISCUS.first_length, search.options.tolerance
     robust = replace(problem, exact=False)
     balance = evaluate(robust, unknowns, second_order=False)
-    steps_allowed = min(MENISCUS.max_newton_steps, search.options.max_iterations)
+    steps_allowed = min(MARCHING.max_newton_steps, search.options.max_iterations)
     stationary = False
-    for _ in range(MENISCUS.max_time_steps):
+    for _ in range(MARCHING.max_steps):
         stepped = replace(robust, past=implicit_step(problem, length, balance.content))
         search.max_imbalance = MENISCUS.forcing * max(balance.imbalance, SEARCH.max_imbalance)
         steps = newton(stepped, balance.unknowns, second_order=False)
@@ -57,7 +57,7 @@ def march_to_steady(search: MixedSearch, problem: Problem, unknowns: Pressures) 
             stationary = balance.imbalance < SEARCH.max_imbalance and search.converged(tolerance)
         else:
             length *= 0.25
-        if stationary or length < MENISCUS.min_length:
+        if stationary or length < MARCHING.min_length * MENISCUS.first_length:
             break
     search.max_imbalance = np.inf
     if stationary and not problem.exact:  # a steady step would move the meniscus again
