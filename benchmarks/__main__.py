@@ -63,6 +63,7 @@ ABREAST = (
     ("hostile",),
     ("motion_table",),
     ("robustness",),
+    ("controls",),
     ("vibration",),
 )
 PARTS = (*ALONE, *chain.from_iterable(ABREAST))
@@ -76,6 +77,7 @@ WHOLE = (
     "rollers",
     "gallery",
     "soonest",
+    "controls",
 )
 ON_ALL = (
     "recordings",

@@ -1,12 +1,13 @@
 """Benchmark results: csv files included in the page, and reported changes."""
 
+import csv
 import importlib
 from functools import partial
 from types import SimpleNamespace
 
 import pytest
 from benchmarks import __main__ as bench_main
-from benchmarks import chosen_grids, forecast, kept, next_points, unfinished
+from benchmarks import chosen_grids, controls, forecast, kept, next_points, unfinished
 from benchmarks.__main__ import PARTS, TIMES, WHOLE
 from benchmarks.rows import Rows
 from benchmarks.unfinished import Unfinished
@@ -198,6 +199,34 @@ def test_every_part_can_be_run():
     assert len(set(PARTS)) == len(PARTS)
     assert set(WHOLE) < set(PARTS)
     assert all(callable(importlib.import_module(f"benchmarks.{part}").lines) for part in PARTS)
+
+
+def test_each_constant_of_the_search_has_a_row_with_its_present_value():
+    """Most rows show more work or an unsolved contact; changes of few constants show nothing."""
+    constants = controls.constants()
+    assert controls.ROWS.keys() == constants.keys()
+    with (kept.FOLDER / "controls.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["constant"]: row["value"] for row in rows} == {
+        name: f"{value:g}" for name, value in constants.items()
+    }
+
+    def work(text):
+        return [float("inf")] if text == "not solved" else [int(count) for count in text.split("/")]
+
+    dearer = [
+        row["constant"]
+        for row in rows
+        if max(work(row["steps with the change"])) > 1.04 * max(work(row["steps"]))
+    ]
+    assert len(dearer) > 0.8 * len(rows)
+
+
+def test_a_changed_constant_is_restored():
+    before = controls.constants()
+    with controls.changed("Meniscus.front", 40.0):
+        assert controls.constants() == before | {"Meniscus.front": 40.0}
+    assert controls.constants() == before
 
 
 @pytest.fixture

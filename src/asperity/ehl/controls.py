@@ -1,7 +1,8 @@
 """Constants that control the search for a solution, each with its unit and its reason.
 
 They decide whether and how fast the solver converges, not what it converges to, unless a comment
-says otherwise. Residuals are root mean squares as a share of p_h.
+says otherwise. Residuals are root mean squares as a share of p_h. Each constant has a row in
+`benchmarks/controls.py` that shows what another value costs.
 """
 
 from dataclasses import dataclass
