@@ -40,8 +40,7 @@ class Change(NamedTuple):
     contact: str
 
 
-# the change whose effect was found largest; where none had any, its limits are far from those of
-# these contacts
+# of the changes tried, the one with the largest effect; a few have none on these contacts
 ROWS = {
     "Residuals.initial_guess": Change(0.3, "wide 1, 64, conserving"),
     "Residuals.rough_solution": Change(3e-3, "wide 210, 64, mixed"),

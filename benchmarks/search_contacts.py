@@ -29,8 +29,7 @@ from asperity.transient import moving_contact
 from benchmarks import chosen_grids, films, robustness, rollers
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
-POLYMER = """model = "conserving"
-[contact]
+POLYMER = """[contact]
 geometry = "line"
 radius = "0.59 m"
 load = "3918 N"
@@ -41,14 +40,14 @@ youngs_modulus = "3.6 GPa"
 poisson_ratio = 0.38
 hardness = "0.25 GPa"
 [lubricant]
-viscosity = { law = "roelands", eta0 = "1.07 mPa s", alpha = "7.8 1/GPa" }
-density = { law = "dowson-higginson", rho0 = "870 kg/m^3" }
+viscosity = {{ law = "roelands", eta0 = "1.07 mPa s", alpha = "7.8 1/GPa" }}
+density = {{ law = "dowson-higginson", rho0 = "870 kg/m^3" }}
 rheology = "newtonian"
 [grid]
 cells = [5520, 16]
 [surface]
-kind = "flat"
-"""
+{surface}
+"""  # water between polymers, M 3700, L 0.01
 MOST_STEPS = 150
 
 Outcome = tuple[bool, int, float]
@@ -152,8 +151,8 @@ def _smooth() -> dict[str, Callable[[], Outcome]]:
         )
 
     def polymer() -> Outcome:
-        """Water-like oil between polymers, M 3700, L 0.01."""
-        case = load_case(POLYMER, name="polymer.toml")
+        text = 'model = "conserving"\n' + POLYMER.format(surface='kind = "flat"')
+        case = load_case(text, name="polymer.toml")
         return _of(
             solve_contact(
                 case.conditions, case.lubricant, case.surface(), options=case.options, strict=False

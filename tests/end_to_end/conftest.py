@@ -74,6 +74,13 @@ def two_passages(monkeypatch, short_tracks):  # noqa: ARG001
 
 
 @pytest.fixture
+def page(shared):
+    """Return the solved contact on the page that a file shares; a test leaves it as it found it."""
+    yield shared.as_first()
+    shared.require_no_error()
+
+
+@pytest.fixture
 def disk(monkeypatch):
     """A disk that is full while `full` is set: SQLite cannot write.
 

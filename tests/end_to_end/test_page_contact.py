@@ -78,13 +78,6 @@ def shared(browser, server):
     opened.close()
 
 
-@pytest.fixture
-def page(shared):
-    """Return the solved contact; a test leaves it as it found it."""
-    yield shared.as_first()
-    shared.require_no_error()
-
-
 @pytest.fixture(scope="module")
 def ring(tmp_path_factory):
     """Write a measured surface that is large enough for the contact."""

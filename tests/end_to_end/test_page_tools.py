@@ -53,13 +53,6 @@ def shared(browser, server):
     opened.close()
 
 
-@pytest.fixture
-def page(shared):
-    """Return the solved contact; a test leaves it as it found it."""
-    yield shared.as_first()
-    shared.require_no_error()
-
-
 def type_value(page, name, text):
     box = page.get_by_role("textbox", name=name)
     box.fill(text)

@@ -5,6 +5,7 @@ from itertools import islice, pairwise
 
 import numpy as np
 import pytest
+from benchmarks.controls import effort
 
 from asperity.contact.grid import Grid
 from asperity.core.errors import BadInput, NotConverged
@@ -524,3 +525,10 @@ def test_moving_waviness_is_that_of_the_unified_model_in_a_full_film():
     assert 0.1 < amplitudes[0] < 0.8
     # 4 % larger here, 2 % on twice as many cells
     assert amplitudes[1] == pytest.approx(amplitudes[0], rel=0.05)
+
+
+def test_a_time_step_of_moving_roughness_is_not_abandoned_when_its_residual_rises():
+    """Given up at ten times the first residual, these four steps took 405 Newton steps."""
+    moving = effort("running, conserving")
+    assert moving.solved
+    assert moving.newton < 150

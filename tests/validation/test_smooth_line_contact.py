@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.search_contacts import POLYMER
 from threadpoolctl import threadpool_limits
 
 from asperity.case import load_case
@@ -137,25 +138,6 @@ def test_the_film_agrees_with_dowson_and_higginson_within_ten_percent():
     )
 
 
-POLYMER = """[contact]
-geometry = "line"
-radius = "0.59 m"
-load = "3918 N"
-length = "4.322 mm"
-entrainment_speed = "11.5 mm/s"
-[material]
-youngs_modulus = "3.6 GPa"
-poisson_ratio = 0.38
-hardness = "0.25 GPa"
-[lubricant]
-viscosity = {{ law = "roelands", eta0 = "1.07 mPa s", alpha = "7.8 1/GPa" }}
-density = {{ law = "dowson-higginson", rho0 = "870 kg/m^3" }}
-rheology = "newtonian"
-[grid]
-cells = [5520, 16]
-[surface]
-{surface}
-"""
 SURFACES = {
     "flat": 'kind = "flat"',
     "ground": 'kind = "ground"\nsq = "14 nm"\ngroove_width = "2 mm"\ngroove_length = "9 mm"\n'

@@ -88,7 +88,9 @@ class Oscillation:
     """Linear response of an oscillating contact."""
 
     round_tolerance: float = 3e-5  # relative residual of a round: the limit of single precision
-    stagnation: float = 0.3  # residual ratio above which the next round is in double precision
+    # residual ratio (or a round's tolerance, if that is more) above which the next round is in
+    # double precision
+    stagnation: float = 0.3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
