@@ -20,6 +20,8 @@ from asperity.ehl.newton.single_pressure import newton
 from asperity.ehl.outcome import Figures, SolveStrategy
 from asperity.ehl.problem_setup import contact_problem, first_guess, grid_levels
 from asperity.ehl.scales import Scales
+from asperity.ehl.strategies import cold_start
+from asperity.ehl.strategies.cold_start import STRATEGIES
 from asperity.ehl.strategies.mixed_search import MixedSearch
 from asperity.lubricant import Barus
 from asperity.solution import contact_state
@@ -238,19 +240,19 @@ def test_hertz_pressure_is_the_start_if_the_dry_contact_fails(monkeypatch):
     surface = rough(grid((64, 48)), 1e-6, correlation_length=40e-6)
     usual = solved(surface)
 
-    def stalled_search(self, levels, *_):
+    def stalled_search(search, levels):
         problem = levels[0]
         zero = Pressures(np.zeros(problem.cells), np.zeros(problem.cells), 0.0)
-        return self.run(problem, mixed_newton(problem, zero, second_order=False), 1e-4, 1)
+        return search.run(problem, mixed_newton(problem, zero, second_order=False), 1e-4, 1)
 
-    monkeypatch.setattr(MixedSearch, "from_dry", stalled_search)
+    monkeypatch.setattr(cold_start, "solve_from_dry", stalled_search)
     retried = solved(surface)
     assert usual.convergence.attempt == SolveStrategy.FROM_DRY
     assert retried.convergence.attempt == SolveStrategy.COARSE_TO_FINE
     assert contact_state(retried).clr == pytest.approx(contact_state(usual).clr, abs=2e-3)
 
 
-@pytest.mark.parametrize("strategy", [SolveStrategy.COARSE_TO_FINE, SolveStrategy.FROM_DRY])
+@pytest.mark.parametrize("strategy", STRATEGIES[:2], ids=lambda strategy: strategy.name)
 @pytest.mark.parametrize("model", ["mixed", "conserving"])
 def test_a_strategys_error_is_estimated_from_its_own_iterations(model, strategy):
     """Results of a failed strategy do not enter the next one's error; the cell size always does."""
@@ -259,13 +261,15 @@ def test_a_strategys_error_is_estimated_from_its_own_iterations(model, strategy)
     problem = contact_problem(
         CONDITIONS, OIL, rough(grid((96, 96)), 1e-6, correlation_length=40e-6), options
     )
+    problem = replace(problem, exact=False)
     search = MixedSearch(options, scales.gap, None)
     search.by_first_order = Figures(car=50.0, clr=50.0, h_min=50.0, h_central=50.0)
-    search.solve_by(
-        strategy, grid_levels(problem), lambda on: first_guess(on, CONDITIONS, OIL, scales)
+    search.prepare(problem)
+    strategy.solve(
+        search, grid_levels(problem), lambda on: first_guess(on, CONDITIONS, OIL, scales)
     )
     assert search.converged(options.tolerance)
-    search.solve_coarser_grid(problem)
+    cold_start.solve_coarser_grid(search, problem)
     assert search.cell == problem.spacing[0]
     assert 0.0 < search.discretisation_error.clr < 1.0
 

@@ -36,7 +36,6 @@ class StepLimits:
 class MixedNewton:
     """Newton iteration of the mixed model."""
 
-    state_offset: float = 1e-9  # beyond a state's bound, puts a cell into the next state
     line_search_residual: float = 0.03  # below it a step that increases the residual is halved
     max_residual_growth: float = 1.5  # of a step that is not halved
     # of one step: in the content of a ruptured cell and, with exact face mobilities, in the film
@@ -80,17 +79,6 @@ class KrylovMethod:
     tolerance: float = 0.1  # relative residual: an inexact Newton method
     max_steps: int = 100
     reorthogonalise: float = 0.5  # share of a vector left, below which it is orthogonalised again
-    stagnation: float = 0.9  # residual ratio of a step above which the basis vector continues
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Oscillation:
-    """Linear response of an oscillating contact."""
-
-    round_tolerance: float = 3e-5  # relative residual of a round: the limit of single precision
-    # residual ratio (or a round's tolerance, if that is more) above which the next round is in
-    # double precision
-    stagnation: float = 0.3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,7 +87,6 @@ class DryContact:
 
     max_krylov_steps: int = 1000  # of conjugate gradients, in all
     max_rounds: int = 30  # of active sets, of windows around them, of redistributed load
-    window_margin: int = 32  # a window adds one in so many of all lines on either side
     tolerance: float = 1e-4  # residual of conjugate gradients once the set is stable
 
 
@@ -172,7 +159,6 @@ MIXED_NEWTON = MixedNewton()
 MIXED_SOLVER = MixedLinearSolver()
 PRECONDITIONER = Preconditioner()
 KRYLOV = KrylovMethod()
-OSCILLATION = Oscillation()
 DRY = DryContact()
 REFINEMENT = LocalRefinement()
 CONTINUATION = GridContinuation()

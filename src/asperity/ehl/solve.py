@@ -3,7 +3,7 @@
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,24 +12,20 @@ from asperity.contact.grid import Grid
 from asperity.core.arrays import Field, usual_float_errors
 from asperity.core.errors import BadInput, NotConverged
 from asperity.ehl.contact_solution import ContactSolution
-from asperity.ehl.controls import RESIDUALS
 from asperity.ehl.far_pressure import build_up_lengths
 from asperity.ehl.film_formulas import central_film, require_thin_film
+from asperity.ehl.inlet_layer import InletLayer
 from asperity.ehl.models.elastic_dry import elastic_contact
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.single_pressure import Step, newton
-from asperity.ehl.outcome import PAPER, Options, SolveStrategy
-from asperity.ehl.problem_setup import (
-    contact_problem,
-    first_guess,
-    reduced_problem,
-    smooth_film,
-    usable_levels,
-)
+from asperity.ehl.outcome import TWO_PRESSURES, Options, SolveStrategy
+from asperity.ehl.problem_setup import contact_problem, first_guess, reduced_problem, usable_levels
 from asperity.ehl.scales import Scales
+from asperity.ehl.strategies.cold_start import solve_cold
 from asperity.ehl.strategies.grid_continuation import Progress, Search
 from asperity.ehl.strategies.mixed_search import MixedSearch
 from asperity.ehl.strategies.oil_state import pressures_of
+from asperity.ehl.strategies.one_grid import FROM_NEIGHBOUR
 from asperity.ehl.strategies.starved_inlet import emptied_inlet, march_to_steady, passes_less
 from asperity.lubricant import Lubricant, require_liquid
 from asperity.surface import Surface
@@ -77,46 +73,68 @@ def solve_contact(
         require_thin_film(conditions, lubricant)
     if viscosity_factor is not None:
         _check_factor(viscosity_factor, surface)
-    solve = SOLVERS[options.model if lubricant else PAPER]  # one pressure without oil
-    if options.inlet_layer is not None and lubricant is not None:
-        solve = solve_starved
-    solution = solve(
-        conditions,
-        lubricant,
-        surface,
-        options=options,
-        start=start,
-        viscosity_factor=viscosity_factor,
-        progress=progress,
-    )
+    contact = _Contact(conditions, lubricant, surface, options, start, viscosity_factor, progress)
+    if lubricant is None or options.model not in TWO_PRESSURES:
+        solution = _solve_unified(contact)
+    elif options.inlet_layer is None:
+        solution = _solve_mixed(contact)
+    else:
+        solution = _solve_starved(contact, options.inlet_layer)
     if strict and not solution.convergence.converged:
         raise NotConverged(solution, f"contact not solved: {solution.convergence.explain()}")
     return solution
 
 
-def solve_unified(
-    conditions: ContactConditions,
-    lubricant: Lubricant | None,
-    surface: Surface,
-    *,
-    options: Options,
-    start: ContactSolution | None = None,
-    viscosity_factor: Field | None = None,
-    progress: Progress | None = None,
-) -> ContactSolution:
-    """Solve the single-pressure model, or a dry contact; called by `solve_contact`."""
+class _Contact(NamedTuple):
+    """Contact to solve, as in `solve_contact`."""
+
+    conditions: ContactConditions
+    lubricant: Lubricant | None
+    surface: Surface
+    options: Options
+    start: ContactSolution | None
+    viscosity_factor: Field | None
+    progress: Progress | None
+
+    @property
+    def scales(self) -> Scales:
+        """Scales of the dimensionless problem."""
+        return Scales.from_conditions(self.conditions, self.lubricant)
+
+    @property
+    def problem(self) -> Problem:
+        """Smallest equivalent problem."""
+        return reduced_problem(contact_problem(*self[:4], self.viscosity_factor))
+
+    def solution(
+        self, search: Search, step: Step, strategy: SolveStrategy, began: float
+    ) -> ContactSolution:
+        """Return the result of a search that `began` at a time of the performance counter."""
+        solution = search.solution(
+            step,
+            self.surface,
+            self.conditions,
+            self.lubricant,
+            seconds=time.perf_counter() - began,
+            strategy=strategy,
+            start=self.start,
+        )
+        return replace(solution, viscosity_factor=self.viscosity_factor)
+
+
+def _solve_unified(contact: _Contact) -> ContactSolution:
+    """Solve the single-pressure model, or a dry contact."""
     began = time.perf_counter()
-    scales = Scales.from_conditions(conditions, lubricant)
-    full_problem = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
-    finest = reduced_problem(full_problem)
+    conditions, lubricant, options = contact.conditions, contact.lubricant, contact.options
+    finest, scales = contact.problem, contact.scales
     elastic = lubricant is None and conditions.hardness is None
-    search = (ElasticSearch if elastic else Search)(options, scales.gap, progress)
-    if start is None:
+    search = (ElasticSearch if elastic else Search)(options, scales.gap, contact.progress)
+    if contact.start is None:
         levels = usable_levels(finest, conditions, lubricant)
         guess = first_guess(levels[-1], conditions, lubricant, scales)
     else:
         levels = [finest]
-        guess = _warm_start(start, finest, scales)
+        guess = _warm_start(contact.start, finest, scales)
     for strategy in (
         SolveStrategy.COARSE_TO_FINE,
         SolveStrategy.SECOND_ORDER,
@@ -129,139 +147,49 @@ def solve_unified(
         step = search.solve_levels(levels, *guess, fixed=strategy == SolveStrategy.FIXED_APPROACH)
         if search.converged(options.tolerance):
             break
-    solution = search.solution(
-        step,
-        surface,
-        conditions,
-        lubricant,
-        seconds=time.perf_counter() - began,
-        strategy=strategy,
-        start=start,
-    )
-    return replace(solution, viscosity_factor=viscosity_factor)
+    return contact.solution(search, step, strategy, began)
 
 
-def solve_mixed(
-    conditions: ContactConditions,
-    lubricant: Lubricant | None,
-    surface: Surface,
-    *,
-    options: Options,
-    start: ContactSolution | None = None,
-    viscosity_factor: Field | None = None,
-    progress: Progress | None = None,
-) -> ContactSolution:
-    """Solve a two-pressure model; called by `solve_contact`."""
+def _solve_mixed(contact: _Contact) -> ContactSolution:
+    """Solve a two-pressure model."""
     began = time.perf_counter()
-    assert lubricant is not None  # a dry contact has one pressure
-    scales = Scales.from_conditions(conditions, lubricant)
-    full_problem = contact_problem(conditions, lubricant, surface, options, viscosity_factor)
-    finest = reduced_problem(full_problem)
-    search = MixedSearch(options, scales.gap, progress)
-    if start is not None and start.convergence.attempt == SolveStrategy.ARITHMETIC_MEANS:
-        search.arithmetic, finest = True, replace(finest, exact=False)
-    if start is not None:
+    start, finest, scales = contact.start, contact.problem, contact.scales
+    search = MixedSearch(contact.options, scales.gap, contact.progress)
+    if start is None:
+        assert contact.lubricant is not None  # a dry contact has one pressure
+        strategy, step = solve_cold(
+            search, finest, contact.surface, contact.conditions, contact.lubricant
+        )
+    else:
+        if start.convergence.attempt == SolveStrategy.ARITHMETIC_MEANS:
+            search.arithmetic, finest = True, replace(finest, exact=False)
         strategy, unknowns = SolveStrategy.COARSE_TO_FINE, pressures_of(start, finest, scales)
-        if options.inlet_layer is None:
-            step = search.continue_from(finest, unknowns)
+        if contact.options.inlet_layer is None:
+            step = search.first_converged(FROM_NEIGHBOUR, finest, unknowns)
         else:
             step = march_to_steady(search, finest, unknowns)
-    else:
-        strategy, step = _solve_cold(search, finest, surface, conditions, lubricant)
-    solution = search.solution(
-        step,
-        surface,
-        conditions,
-        lubricant,
-        seconds=time.perf_counter() - began,
-        strategy=SolveStrategy.ARITHMETIC_MEANS if search.arithmetic else strategy,
-        start=start,
-    )
-    return replace(solution, viscosity_factor=viscosity_factor)
+    if search.arithmetic:
+        strategy = SolveStrategy.ARITHMETIC_MEANS
+    return contact.solution(search, step, strategy, began)
 
 
-def solve_starved(
-    conditions: ContactConditions,
-    lubricant: Lubricant | None,
-    surface: Surface,
-    *,
-    options: Options,
-    start: ContactSolution | None = None,
-    viscosity_factor: Field | None = None,
-    progress: Progress | None = None,
-) -> ContactSolution:
-    """Solve a conserving contact with an inlet layer; called by `solve_contact`.
+def _solve_starved(contact: _Contact, layer: InletLayer) -> ContactSolution:
+    """Solve a conserving contact with an inlet layer.
 
     The initial guess is the neighbouring solution, if there is one, and then the flooded contact
     with an emptied inlet. In a line contact no oil flows aside: if the layer is more than the
     contact passes, it is flooded.
     """
     began = time.perf_counter()
-    assert options.inlet_layer is not None
-    solve = partial(
-        solve_mixed,
-        conditions,
-        lubricant,
-        surface,
-        viscosity_factor=viscosity_factor,
-        progress=progress,
-    )
-    solution = None if start is None else solve(options=options, start=start)
+    solution = None if contact.start is None else _solve_mixed(contact)
     if solution is None or not solution.convergence.converged:
-        flooded = solve(options=replace(options, inlet_layer=None))
-        if conditions.endless and passes_less(flooded, options.inlet_layer):
+        options = replace(contact.options, inlet_layer=None)
+        flooded = _solve_mixed(contact._replace(options=options, start=None))
+        if contact.conditions.endless and passes_less(flooded, layer):
             return flooded
-        solution = solve(options=options, start=emptied_inlet(flooded, options.inlet_layer))
+        solution = _solve_mixed(contact._replace(start=emptied_inlet(flooded, layer)))
     taken = replace(solution.convergence, seconds=time.perf_counter() - began)
     return replace(solution, convergence=taken)
-
-
-def _solve_cold(
-    search: MixedSearch,
-    finest: Problem,
-    surface: Surface,
-    conditions: ContactConditions,
-    lubricant: Lubricant,
-) -> tuple[SolveStrategy, Step]:
-    """Solve without a neighbouring solution; return the strategy and its last step."""
-    options, scales = search.options, Scales.from_conditions(conditions, lubricant)
-    film, robust = smooth_film(conditions, lubricant), replace(finest, exact=False)
-    tolerance, search.is_guess = options.tolerance, finest.exact
-    if finest.exact:
-        tolerance = max(tolerance, RESIDUALS.rough_solution)
-        search.options = replace(options, tolerance=tolerance)
-    for strategy in _strategies(surface, film, options.contact_film):
-        problem = (
-            robust if strategy == SolveStrategy.COARSE_TO_FINE else replace(robust, accurate=False)
-        )
-        levels = usable_levels(problem, conditions, lubricant)
-        step = search.solve_by(
-            strategy, levels, lambda on: first_guess(on, conditions, lubricant, scales)
-        )
-        if search.converged(tolerance):
-            if (
-                strategy != SolveStrategy.COARSE_TO_FINE
-                and finest.accurate
-                and finest.form.roller is not None
-            ):
-                strategy, step = search.refine_third_order(finest, step)
-            search.solve_coarser_grid(robust)
-            if finest.exact:
-                search.options, search.is_guess = options, False
-                step = search.solve_again(search.solved)
-        if search.converged(options.tolerance):
-            break
-    search.options = options
-    return strategy, step
-
-
-def _strategies(surface: Surface, film: float, contact_film: float) -> tuple[SolveStrategy, ...]:
-    """Return the strategies in their order, by the film [m] of the smooth bodies."""
-    coarse_to_fine, from_dry = SolveStrategy.COARSE_TO_FINE, SolveStrategy.FROM_DRY
-    if np.any(surface.heights):
-        return (from_dry, coarse_to_fine) if film < surface.sq else (coarse_to_fine, from_dry)
-    smooth = (coarse_to_fine, SolveStrategy.SECOND_ORDER)
-    return (from_dry, *smooth) if film < contact_film else smooth
 
 
 class ElasticSearch(Search):
@@ -295,14 +223,6 @@ class ElasticSearch(Search):
             )
             self.figures.append(self.figures_of(step))
         return step
-
-
-SOLVERS = {
-    "unified": solve_unified,
-    "paper": solve_unified,
-    "mixed": solve_mixed,
-    "conserving": solve_mixed,
-}
 
 
 def _warm_start(start: ContactSolution, problem: Problem, scales: Scales) -> tuple[Field, float]:

@@ -26,6 +26,7 @@ from asperity.ehl.problem_setup import contact_problem
 from asperity.ehl.strategies.grid_continuation import Search
 from asperity.ehl.strategies.mixed_search import MixedSearch
 from asperity.ehl.strategies.oil_state import pressures_of
+from asperity.ehl.strategies.one_grid import FROM_NEIGHBOUR
 from asperity.lubricant import Lubricant
 from asperity.solution.state import state_of
 from asperity.surface import MovingSurfaces, Surface
@@ -204,7 +205,8 @@ class TransientContact:
         """Solve a step; return the search, its last iterate and the strategy used."""
         if self.options.model in TWO_PRESSURES:
             mixed = MixedSearch(self.options, self.scales.gap, None)
-            return mixed, mixed.continue_from(problem, unknowns), SolveStrategy.COARSE_TO_FINE
+            step = mixed.first_converged(FROM_NEIGHBOUR, problem, unknowns)
+            return mixed, step, SolveStrategy.COARSE_TO_FINE
         search = Search(self.options, self.scales.gap, None)
         # if Newton's method fails: at fixed approach, found by bracketing
         for fixed in (False, True):

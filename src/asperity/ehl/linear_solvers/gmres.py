@@ -174,7 +174,7 @@ class Shifted:
         self.triangle = np.zeros((max_steps, max_steps), complex)
         self.times, self.plus = scipy.linalg.get_blas_funcs(("gemv", "axpy"), (self.basis,))
         self.sums: list[complex] = []
-        self.falls: bool
+        self.continues: bool  # from the last basis vector, not from the residual
         self._begin()
 
     @property
@@ -198,15 +198,17 @@ class Shifted:
 
     def step(self) -> bool:
         """Add a correction; return False if it is linearly dependent."""
-        norm = _norm(self.defect)
-        vector = self.defect / self.kind.type(norm) if self.falls else self.basis[self.count - 1]
+        if self.continues:
+            vector = self.basis[self.count - 1]
+        else:
+            vector = self.defect / self.kind.type(_norm(self.defect))
         correction = self.precondition(vector)
         rows, stored = self.product(correction)
         if not self._append(self.plus(stored, rows, a=1j * self.frequency)):
             return False
         self.corrections[self.count], self.stored[self.count] = correction, stored
         self.sums.append(complex(correction @ self.bearing))
-        self.count, self.falls = self.count + 1, _norm(self.defect) < KRYLOV.stagnation * norm
+        self.count, self.continues = self.count + 1, True
         return True
 
     def move(self, frequency: float) -> None:
@@ -229,7 +231,7 @@ class Shifted:
         a, b = self.rhs
         self.defect = a + self.kind.type(1j * self.frequency) * b
         self.size = _norm(self.defect)
-        self.falls = True
+        self.continues = False
         self.target: list[complex] = []
 
     def _append(self, vector: Vector) -> bool:

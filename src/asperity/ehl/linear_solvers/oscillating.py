@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from asperity.core.arrays import Field, Mask
-from asperity.ehl.controls import KRYLOV, OSCILLATION
+from asperity.ehl.controls import KRYLOV
 from asperity.ehl.deflection import Deflection
 from asperity.ehl.linear_solvers.gmres import Shifted, gmres
 from asperity.ehl.linear_solvers.mixed import MixedLinear
@@ -231,11 +231,11 @@ class Oscillating:
             vector = start.unknowns
             residual, ratio = self._residual(rhs, vector, frequency, size)
         while ratio > tolerance:
-            target = max(tolerance / ratio, OSCILLATION.round_tolerance)
+            target = max(tolerance / ratio, float(np.finfo(solver.real).eps))
             change, count = _solved(solver, residual, frequency, target)
             residual, updated_ratio = self._residual(rhs, vector + change, frequency, size)
             steps += count
-            if not updated_ratio <= max(OSCILLATION.stagnation, target) * ratio:
+            if not updated_ratio <= max(KRYLOV.tolerance, target) * ratio:
                 if solver is self.exact:
                     break
                 solver = self.exact

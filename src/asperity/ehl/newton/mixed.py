@@ -19,6 +19,8 @@ from asperity.ehl.newton.step_limit import ApproachLimit, StepLimit
 from asperity.kernels.load_sharing import FREE
 from asperity.kernels.reynolds import CAPPED
 
+EPSILON = float(np.finfo(float).eps)  # beyond a state's bound, puts a cell into the next state
+
 
 class _StepProposal(NamedTuple):
     """A balance, limited changes of all unknowns from it, and their share that is taken."""
@@ -200,6 +202,6 @@ def _updated_oil(balance: MixedBalance, step: Field) -> Field:
     least = (1.0 - MIXED_NEWTON.max_film_decrease) * (1.0 + current) - 1.0
     signed = np.where(ruptured, np.maximum(signed, least), signed)
     signed = np.where(ruptured & (signed >= 0.0), 0.0, signed)
-    signed = np.where(full & (signed < 0.0), -MIXED_NEWTON.state_offset, signed)
-    signed = np.where(full & (signed > cap), cap * (1.0 + MIXED_NEWTON.state_offset), signed)
-    return np.where(pressed & (signed <= cap), cap * (1.0 - MIXED_NEWTON.state_offset), signed)
+    signed = np.where(full & (signed < 0.0), -EPSILON, signed)
+    signed = np.where(full & (signed > cap), cap * (1.0 + EPSILON), signed)
+    return np.where(pressed & (signed <= cap), cap * (1.0 - EPSILON), signed)

@@ -7,7 +7,7 @@ import numpy as np
 
 from asperity.contact.conditions import ContactConditions
 from asperity.core.arrays import Field, Mask
-from asperity.ehl.contact_solution import ContactSolution
+from asperity.ehl.contact_solution import ContactSolution, Oil
 from asperity.ehl.controls import CONTINUATION, RESIDUALS
 from asperity.ehl.grid_error import grid_error
 from asperity.ehl.grid_transfer import AnyField
@@ -230,23 +230,10 @@ class Search:
         """
         discretisation = self.discretisation_error
         if start is not None:
-            alike = replace(start.options, max_iterations=self.options.max_iterations)
-            same = (start.conditions, start.lubricant, alike) == (
-                conditions,
-                lubricant,
-                self.options,
-            )
-            same = (
-                same
-                and start.grid == surface.grid
-                and np.array_equal(start.surface.heights, surface.heights)
-            )
+            same = _solves(start, surface, conditions, lubricant, self.options)
             discretisation = start.convergence.discretisation_error if same else None
-        scales, balance, lines = (
-            Scales.from_conditions(conditions, lubricant),
-            step.balance,
-            surface.grid.cells[1],
-        )
+        scales, balance = Scales.from_conditions(conditions, lubricant), step.balance
+        lines = surface.grid.cells[1]
         stopped = SolveStatus.STALLED if self.failed else SolveStatus.OUT_OF_ITERATIONS
         touching = balance.in_contact & (balance.pressure > 0.0)
         pressure, height = (
@@ -262,6 +249,7 @@ class Search:
             gap=height * scales.gap,
             in_contact=on_all_lines(balance.problem, touching, lines),
             rigid_approach=step.approach * scales.gap,
+            oil=self.oil(step, lines, scales),
             convergence=Convergence(
                 status=SolveStatus.CONVERGED if self.converged(self.options.tolerance) else stopped,
                 history=tuple(self.history),
@@ -272,6 +260,10 @@ class Search:
                 discretisation_error=discretisation,
             ),
         )
+
+    def oil(self, _step: Step, _lines: int, _scales: Scales) -> Oil | None:
+        """Return the state of the oil; None where it shares its pressure with the asperities."""
+        return None
 
     def figures_of(self, step: Step) -> Figures:
         """Return the key results of a step."""
@@ -288,6 +280,20 @@ class Search:
         self.history.append(iteration)
         if self.progress:
             self.progress(iteration)
+
+
+def _solves(
+    start: ContactSolution,
+    surface: Surface,
+    conditions: ContactConditions,
+    lubricant: Lubricant | None,
+    options: Options,
+) -> bool:
+    """Return True if a solution is that of the same contact, whatever its temperature."""
+    alike = replace(start.options, max_iterations=options.max_iterations)
+    same = (start.conditions, start.lubricant, alike) == (conditions, lubricant, options)
+    same = same and start.grid == surface.grid
+    return same and np.array_equal(start.surface.heights, surface.heights)
 
 
 class _Bracket:

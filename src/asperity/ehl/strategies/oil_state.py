@@ -11,7 +11,6 @@ from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.single_pressure import Step
 from asperity.ehl.scales import Scales
 from asperity.ehl.strategies.grid_continuation import on_all_lines
-from asperity.surface import Surface
 
 
 def pressures_of(solution: ContactSolution, problem: Problem, scales: Scales) -> Pressures:
@@ -45,12 +44,12 @@ def _signed(oil: Oil, problem: Problem, scales: Scales) -> Field:
     )
 
 
-def oil_of(step: Step, surface: Surface, scales: Scales) -> Oil:
-    """Return the state of the oil of a step, in SI units."""
+def oil_of(step: Step, lines: int, scales: Scales) -> Oil:
+    """Return the state of the oil of a step on so many lines of cells, in SI units."""
     balance = step.balance
     assert isinstance(balance, MixedBalance)
     content, pressure, growth = (
-        on_all_lines(balance.problem, part, surface.grid.cells[1])
+        on_all_lines(balance.problem, part, lines)
         for part in (balance.film_share, balance.oil_pressure, balance.growth)
     )
     return Oil(content=content, pressure=pressure * scales.pressure, growth=growth * scales.gap)

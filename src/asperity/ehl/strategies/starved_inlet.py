@@ -9,10 +9,10 @@ from asperity.ehl.controls import MARCHING, MENISCUS, RESIDUALS, SEARCH
 from asperity.ehl.inlet_layer import InletLayer
 from asperity.ehl.models.mixed import Pressures, evaluate
 from asperity.ehl.models.single_pressure import Problem
-from asperity.ehl.newton.mixed import newton
 from asperity.ehl.newton.single_pressure import Step
-from asperity.ehl.strategies.mixed_search import MixedSearch, implicit_step
+from asperity.ehl.strategies.mixed_search import MixedSearch
 from asperity.ehl.strategies.oil_state import unknowns_of
+from asperity.ehl.strategies.one_grid import FROM_NEIGHBOUR, implicit_step
 
 
 def emptied_inlet(flooded: ContactSolution, layer: InletLayer) -> ContactSolution:
@@ -49,22 +49,21 @@ def march_to_steady(search: MixedSearch, problem: Problem, unknowns: Pressures) 
     for _ in range(MARCHING.max_steps):
         stepped = replace(robust, past=implicit_step(problem, length, balance.content))
         search.max_imbalance = MENISCUS.forcing * max(balance.imbalance, SEARCH.max_imbalance)
-        steps = newton(stepped, balance.unknowns, second_order=False)
-        step = search.run(stepped, steps, RESIDUALS.coarse_grid, steps_allowed)
+        step = search.steps(stepped, balance.unknowns, RESIDUALS.coarse_grid, steps_allowed)
         if search.converged(RESIDUALS.coarse_grid):
             balance = evaluate(robust, unknowns_of(step), second_order=False)
             length *= _growth(step.number)
             stationary = balance.imbalance < SEARCH.max_imbalance and search.converged(tolerance)
         else:
             length *= 0.25
-        if stationary or length < MARCHING.min_length * MENISCUS.first_length:
+        if stationary or length < MENISCUS.first_length:
             break
     search.max_imbalance = np.inf
     if stationary and not problem.exact:  # a steady step would move the meniscus again
         step = search.run(robust, iter([replace(step, number=0, balance=balance)]), tolerance, 0)
         if search.converged(tolerance):
             return step
-    return search.continue_from(problem, balance.unknowns)
+    return search.first_converged(FROM_NEIGHBOUR, problem, balance.unknowns)
 
 
 def _growth(steps: int) -> float:
