@@ -1,7 +1,7 @@
 """Store benchmark output as csv for `docs/benchmarks.md`, and report changes of its numbers.
 
 The tables of a part go to docs/benchmarks/PART.csv, PART-2.csv ..., its headings and sentences to
-PART-said.csv, with references to the tables. Results of a larger sample are not replaced; a smaller
+PART-text.csv, with references to the tables. Results of a larger sample are not replaced; a smaller
 one is only compared with them.
 """
 
@@ -56,7 +56,7 @@ def keep(part: str, lines: Iterable[str], folder: Path = FOLDER) -> list[str]:
     now = {_name(part, number): table for number, table in enumerate(tables, 1)}
     have, had = (
         sample(sentences),
-        sample([text for row in before.get(f"{part}-said.csv", []) for text in row]),
+        sample([text for row in before.get(f"{part}-text.csv", []) for text in row]),
     )
     if have < had:
         return [
@@ -68,7 +68,7 @@ def keep(part: str, lines: Iterable[str], folder: Path = FOLDER) -> list[str]:
                 for line in changes(name, before[name], now[name])
             ),
         ]
-    now[f"{part}-said.csv"] = [["said"], *([text] for text in sentences)]
+    now[f"{part}-text.csv"] = [["text"], *([text] for text in sentences)]
     folder.mkdir(parents=True, exist_ok=True)
     for name in before.keys() - now.keys():
         (folder / name).unlink()
@@ -166,9 +166,9 @@ def page(folder: Path = FOLDER, parts: Iterable[str] = ()) -> str:
         "Times are from a shared machine: compare ratios within a table.",
     ]
     for part in parts:
-        if not (folder / f"{part}-said.csv").is_file():
+        if not (folder / f"{part}-text.csv").is_file():
             continue
-        for (line,) in read(folder / f"{part}-said.csv")[1:]:
+        for (line,) in read(folder / f"{part}-text.csv")[1:]:
             number = re.fullmatch(r"\{(\d+)\}", line)
             if number:
                 head, *rows = read(folder / _name(part, int(number[1])))
@@ -196,5 +196,5 @@ def _files(part: str, folder: Path) -> list[Path]:
     return [
         path
         for path in sorted(folder.glob("*.csv"))
-        if re.fullmatch(rf"{part}(-said|-\d+)?\.csv", path.name)
+        if re.fullmatch(rf"{part}(-text|-\d+)?\.csv", path.name)
     ]

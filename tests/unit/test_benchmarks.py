@@ -24,7 +24,7 @@ LINES = [
 
 
 def test_stored_lines_are_rendered_as_a_page(tmp_path):
-    assert kept.keep("cost", LINES, tmp_path) == ["cost.csv: new", "cost-said.csv: new"]
+    assert kept.keep("cost", LINES, tmp_path) == ["cost.csv: new", "cost-text.csv: new"]
     assert (tmp_path / "cost.csv").read_text("utf-8") == "cells,time [s]\n256,0.50\n512,2.0 ± 0.1\n"
     page = kept.page(tmp_path, ["absent", "cost"])
     assert (
@@ -60,7 +60,7 @@ def test_each_table_has_a_file_and_a_removed_table_has_none(tmp_path):
         (
             "Median 0.48 s.",
             "Median 0.96 s.",
-            ["cost-said.csv: Median 0.96 s., said: 0.48 is now 0.96"],
+            ["cost-text.csv: Median 0.96 s., text: 0.48 is now 0.96"],
         ),
         ("| 256 | 0.50 |\n", "", ["cost.csv: 2 rows are now 1, 1 of them as before"]),
         (
@@ -72,7 +72,7 @@ def test_each_table_has_a_file_and_a_removed_table_has_none(tmp_path):
             ],
         ),
         ("| 512 | 2.0 ± 0.1 |", "| 512 | 2.0 | 0.1 |", ["cost.csv: has another shape"]),
-        ("\nMedian 0.48 s.", "", ["cost-said.csv: has another shape"]),
+        ("\nMedian 0.48 s.", "", ["cost-text.csv: has another shape"]),
     ],
 )
 def test_changes_above_ten_per_cent_are_reported(tmp_path, old, new, reported):

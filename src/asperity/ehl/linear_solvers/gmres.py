@@ -64,7 +64,7 @@ def gmres(
     np.divide(rhs, norm, out=basis[0])
     while count < max_steps:
         if count + 1 == len(basis):
-            basis, corrections = workspace.rows(2 * len(basis), rhs)
+            basis, corrections = workspace.rows(len(basis) + len(basis) // 2, rhs)
         corrections[count] = precondition(basis[count])
         vector = product(corrections[count])
         initial_length = _norm(vector)

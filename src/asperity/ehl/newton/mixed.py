@@ -85,11 +85,15 @@ def newton(
         change = float(np.mean(np.abs(step.total)) / mean_pressure)
         watch.add(balance.residual_rms)
         if shared:
-            proposal = _StepProposal(balance, step, _largest_share(step, balance))
-            balance = _search_below(watch, proposal, second_order=second_order)
+            share = _largest_share(step, balance)
+            balance = _search_below(
+                watch, _StepProposal(balance, step, share), second_order=second_order
+            )
         else:
-            proposal = _StepProposal(balance, limits(step, balance), watch.damping)
-            balance = _line_search(proposal, second_order=second_order)
+            limited = limits(step, balance)
+            balance = _line_search(
+                _StepProposal(balance, limited, watch.damping), second_order=second_order
+            )
 
 
 class _ResidualWatch:
@@ -144,6 +148,7 @@ def _line_search(proposal: _StepProposal, *, second_order: bool) -> MixedBalance
             or damping <= STEP_LIMITS.min_damping
         ):
             return balance
+        del balance
         damping *= 0.5
 
 
@@ -176,14 +181,16 @@ def _search_below(
     bound = max(watch.last)
     whole = watch.last[-1] < RESIDUALS.initial_guess and not watch.stagnated
     least = 1.0 if whole else STEP_LIMITS.min_damping
-    damping, best = 1.0, None
+    damping, best, lowest = 1.0, 1.0, None
     while True:
         balance = proposal.evaluated(damping, second_order=second_order)
-        if best is None or balance.residual_rms < best.residual_rms:
-            best = balance
+        if lowest is None or balance.residual_rms < lowest:
+            best, lowest = damping, balance.residual_rms
         if balance.residual_rms < bound or damping <= least:
-            return best
+            break
+        del balance  # one of a fine grid fills a quarter of a gigabyte
         damping *= 0.5
+    return balance if best == damping else proposal.evaluated(best, second_order=second_order)
 
 
 def _updated_oil(balance: MixedBalance, step: Field) -> Field:

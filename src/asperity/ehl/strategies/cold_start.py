@@ -197,6 +197,7 @@ def solve_cold(
             solve_coarser_grid(search, robust)
             if finest.exact:
                 search.options, search.is_guess = options, False
+                del step  # its fields take as much memory as those of the next solution
                 step = solve_again(search, search.solved)
         if search.converged(options.tolerance):
             break

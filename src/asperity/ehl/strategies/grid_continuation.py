@@ -175,7 +175,8 @@ class Search:
                 break
             if step.balance.residual_rms > largest_residual:
                 break
-            earlier, step = step, next(steps)
+            earlier = step  # drops the fields of the step before
+            step = next(steps)
         if not np.isfinite(step.balance.residual_rms):  # diverged: the last finite solution
             step = earlier
         self.iteration_error = self.figures_of(step).abs_difference(self.figures_of(earlier))

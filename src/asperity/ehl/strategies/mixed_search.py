@@ -64,7 +64,7 @@ class MixedSearch(Search):
 
     imbalance = 0.0  # of the last step, where oil is conserved
     max_imbalance = np.inf  # largest one allowed, at any tolerance
-    solved: Sequence[tuple[Problem, Step]] = ()  # of the figures
+    solved: Sequence[tuple[Problem, Pressures]] = ()  # of the figures
     arithmetic = False  # the last step has arithmetic means in place of exact face mobilities
     is_guess = False  # the solution is only an initial guess for exact face mobilities
 
@@ -113,7 +113,7 @@ class MixedSearch(Search):
     def keep(self, problem: Problem, step: Step) -> None:
         """Keep the figures of a grid's solution, for the estimate of the discretisation error."""
         self.figures.append(self.figures_of(step))
-        self.solved = [*self.solved, (problem, step)][-len(self.figures) :]
+        self.solved = [*self.solved, (problem, unknowns_of(step))][-len(self.figures) :]
 
     def refine_third_order(self, problem: Problem, step: Step) -> tuple[SolveStrategy, Step]:
         """Refine a robust solution of smooth bodies with the third-order wedge.

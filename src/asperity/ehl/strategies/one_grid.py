@@ -36,7 +36,7 @@ class ExactFaces(GridStrategy):
             return step
         robust = replace(problem, exact=False)
         step = search.first_converged(FROM_NEIGHBOUR, robust, guess)
-        return solve_again(search, [(robust, step)])
+        return solve_again(search, [(robust, unknowns_of(step))])
 
 
 class SecondOrder(GridStrategy):
@@ -72,10 +72,7 @@ class SecondOrderFromCoarse(SecondOrder):
 
 
 class RefilledCavities(GridStrategy):
-    """Conserved oil from the contact with refilled cavities, without time steps: they close films.
-
-    It applies to thin films between bodies that touch nowhere.
-    """
+    """Conserved oil from refilled cavities, without time steps, which would close a thin film."""
 
     def applies(self, problem: Problem, guess: Pressures) -> bool:
         """Return True for a thin film of conserved oil."""
@@ -159,18 +156,18 @@ FROM_AFAR = (FromAfar(),)
 AS_GUESS = (CoarseGuess(),)
 
 
-def solve_again(search: MixedSearch, solved: Sequence[tuple[Problem, Step]]) -> Step:
+def solve_again(search: MixedSearch, solved: Sequence[tuple[Problem, Pressures]]) -> Step:
     """Solve the contact again on exact faces, on every grid that is `solved`, coarse to fine.
 
     Where heat thins the oil a hundredfold from cell to cell this may fail; then the solution with
     arithmetic means is kept.
     """
     search.figures, search.by_first_order = [], None
-    for problem, kept in solved:
+    for problem, guess in solved:
         exact, last = replace(problem, exact=True), problem is solved[-1][0]
         tolerance = search.options.tolerance
         tolerance = tolerance if last else max(RESIDUALS.coarse_grid, tolerance)
-        step = solve_exact(search, exact, unknowns_of(kept), tolerance)
+        step = solve_exact(search, exact, guess, tolerance)
         if last or search.converged(tolerance):
             search.keep(exact, step)
         else:
@@ -180,7 +177,7 @@ def solve_again(search: MixedSearch, solved: Sequence[tuple[Problem, Step]]) -> 
     elif problem.viscosity_factor is not None:
         search.arithmetic = True
         robust = replace(problem, exact=False)
-        return search.first_converged(FROM_NEIGHBOUR, robust, unknowns_of(kept))
+        return search.first_converged(FROM_NEIGHBOUR, robust, guess)
     return step
 
 
@@ -205,20 +202,19 @@ def back_to_first_order(problem: Problem, step: Step) -> Step:
 
     It ends when a coarse tolerance is met, or steps no longer change the load share.
     """
-    previous = back = step
+    back, shares = step, [load_share_of(step)]
     for back in islice(
-        newton(problem, unknowns_of(step), second_order=False), CONTINUATION.max_iterations + 1
+        newton(problem, unknowns_of(step), second_order=False),
+        CONTINUATION.max_iterations + 1,
     ):
         if back.number > 0:
-            change, total_change = (
-                abs(load_share_of(back) - load_share_of(other)) for other in (previous, step)
-            )
+            shares.append(load_share_of(back))
+            change, total_change = (abs(shares[-1] - shares[index]) for index in (-2, 0))
             if (
                 back.balance.residual_rms < RESIDUALS.rough_solution
                 or change < SEARCH.backward_tolerance * total_change
             ):
                 break
-            previous = back
     return back
 
 
