@@ -69,6 +69,7 @@ ROWS = {
     "KrylovMethod.reorthogonalise": Change(0.1, "oscillating, 100 kHz"),
     "DryContact.max_krylov_steps": Change(10, "wide 203, 128, mixed"),
     "DryContact.max_rounds": Change(10, "wide 203, 128, mixed"),
+    "DryContact.window_margin": Change(10**9, "polymer line, conserving"),
     "DryContact.tolerance": Change(3e-4, "wide 390, 64, mixed"),
     "LocalRefinement.worst_residual": Change(0.5, "smooth ball of 256 x 256"),
     "LocalRefinement.max_box_share": Change(0.0, "smooth ball of 256 x 256"),

@@ -14,7 +14,7 @@ from asperity.contact.grid import Grid
 from asperity.ehl import Options, solve_contact
 from asperity.ehl.grid_error import grid_error
 from asperity.ehl.grid_transfer import average
-from asperity.ehl.models.mixed import Pressures
+from asperity.ehl.models.mixed import Pressures, evaluate
 from asperity.ehl.newton.mixed import newton as mixed_newton
 from asperity.ehl.newton.single_pressure import newton
 from asperity.ehl.outcome import Figures, SolveStrategy
@@ -250,6 +250,26 @@ def test_hertz_pressure_is_the_start_if_the_dry_contact_fails(monkeypatch):
     assert usual.convergence.attempt == SolveStrategy.FROM_DRY
     assert retried.convergence.attempt == SolveStrategy.COARSE_TO_FINE
     assert contact_state(retried).clr == pytest.approx(contact_state(usual).clr, abs=2e-3)
+
+
+def test_exact_faces_are_solved_from_a_close_guess_if_a_rough_one_fails(monkeypatch):
+    surface = rough(grid((64, 48)), 1e-6, correlation_length=40e-6)
+    usual = solved(surface)
+    solve_again, guesses = cold_start.solve_again, []
+
+    def failing_at_first(search, on_grids):
+        problem, guess = on_grids[-1]
+        guesses.append(evaluate(problem, guess, second_order=True).residual_rms)
+        if len(guesses) > 1:
+            return solve_again(search, on_grids)
+        return search.steps(problem, guess, 1e-4, 0)
+
+    monkeypatch.setattr(cold_start, "solve_again", failing_at_first)
+    retried = solved(surface)
+    assert retried.convergence.attempt == usual.convergence.attempt
+    assert contact_state(retried).clr == pytest.approx(contact_state(usual).clr, abs=2e-3)
+    rough_guess, close_guess = guesses
+    assert close_guess < 1e-4 < rough_guess
 
 
 @pytest.mark.parametrize("strategy", STRATEGIES[:2], ids=lambda strategy: strategy.name)

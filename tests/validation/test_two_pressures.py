@@ -2,6 +2,7 @@
 the start.
 """
 
+import tracemalloc
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -84,6 +85,24 @@ def test_the_load_share_of_the_paper_contact_agrees_with_an_independent_program(
     case = load_case(PAPER).with_overrides({"grid.cells": "[64, 64]", "model": "mixed"})
     solution = solve_contact(case.conditions, case.lubricant, case.surface(), options=case.options)
     assert clr(solution) == pytest.approx(0.7499, abs=0.005)
+
+
+def test_a_solve_holds_the_fields_of_few_newton_steps():
+    """A Newton step has some 30 fields; with earlier iterates and grids kept they were 152."""
+    case = load_case(PAPER).with_overrides({"grid.cells": "[128, 128]", "model": "mixed"})
+    surface = case.surface()
+
+    def solve():
+        solve_contact(case.conditions, case.lubricant, surface, options=case.options)
+
+    solve()  # loads compiled kernels
+    tracemalloc.start()
+    try:
+        solve()
+        _, most = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert most < 115 * surface.heights.nbytes
 
 
 def test_two_starts_give_the_same_solution():

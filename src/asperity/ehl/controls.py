@@ -87,6 +87,7 @@ class DryContact:
 
     max_krylov_steps: int = 1000  # of conjugate gradients, in all
     max_rounds: int = 30  # of active sets, of windows around them, of redistributed load
+    window_margin: int = 32  # a window adds one in so many of all lines on either side
     tolerance: float = 1e-4  # residual of conjugate gradients once the set is stable
 
 

@@ -6,6 +6,7 @@ and edge stress of roller ends are not modelled.
 """
 
 import math
+from abc import abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar, Literal, get_args
@@ -93,8 +94,45 @@ class SlicedRoller:
         return np.asarray(np.maximum(approach[:, None] - 2.0 * self.drop, 0.0))
 
 
+class RollerRow:
+    """Equally spaced rollers of a bearing."""
+
+    place: ClassVar[str] = "cycle_angle"
+
+    rollers: int
+    roller_diameter: float
+    roller_length: float
+    profile: RollerProfile
+    slices: int
+
+    @property
+    @abstractmethod
+    def kinematics(self) -> RollingKinematics:
+        """Speeds and frequencies."""
+
+    @property
+    def angles(self) -> Field:
+        """Positions of the rollers, from the direction of the radial load [rad]."""
+        return 2.0 * np.pi * np.arange(self.rollers) / self.rollers
+
+    @property
+    def frequencies(self) -> dict[str, float]:
+        """Frequencies of shaft, rings, roller and cage [Hz]."""
+        return self.kinematics.frequencies
+
+    @cached_property
+    def _roller(self) -> SlicedRoller:
+        """A roller by slices."""
+        return SlicedRoller(
+            diameter=self.roller_diameter,
+            length=self.roller_length,
+            profile=self.profile,
+            slices=self.slices,
+        )
+
+
 @dataclass(frozen=True, kw_only=True)
-class CylindricalRollerBearing:
+class CylindricalRollerBearing(RollerRow):
     """Cylindrical roller bearing with a rotating inner ring.
 
     Parameters
@@ -131,7 +169,6 @@ class CylindricalRollerBearing:
     '1167 N'
     """
 
-    place: ClassVar[str] = "cycle_angle"
     type_name: ClassVar[str] = "Cylindrical roller bearing"
 
     rollers: int
@@ -157,21 +194,6 @@ class CylindricalRollerBearing:
             diameter=self.roller_diameter,
             pitch_diameter=self.pitch_diameter,
             speed=self.speed,
-        )
-
-    @property
-    def angles(self) -> Field:
-        """Positions of the rollers, from the direction of the load [rad]."""
-        return 2.0 * np.pi * np.arange(self.rollers) / self.rollers
-
-    @cached_property
-    def _roller(self) -> SlicedRoller:
-        """A roller by slices."""
-        return SlicedRoller(
-            diameter=self.roller_diameter,
-            length=self.roller_length,
-            profile=self.profile,
-            slices=self.slices,
         )
 
     @cached_property
@@ -224,11 +246,6 @@ class CylindricalRollerBearing:
     def cage_speed(self) -> float:
         """Speed of the cage [rad/s]."""
         return self.kinematics.cage_speed
-
-    @property
-    def frequencies(self) -> dict[str, float]:
-        """Frequencies of shaft, rings, roller and cage [Hz]."""
-        return self.kinematics.frequencies
 
     def notes(self, pair: ElasticPair) -> tuple[str, ...]:
         """Return the limits of the model."""

@@ -7,7 +7,6 @@ axis, so that the raceways roll without sliding. The line stiffness is that of I
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
 
 import numpy as np
 import scipy
@@ -21,6 +20,7 @@ from asperity.machine.roller import (
     SLICES,
     STIFFNESS,
     RollerProfile,
+    RollerRow,
     SlicedRoller,
     roller_contacts,
     steel_notes,
@@ -38,7 +38,7 @@ APEX_TOLERANCE = math.radians(0.1)  # of a stated cone angle, rounded by catalog
 
 
 @dataclass(frozen=True, kw_only=True)
-class TaperedRollerBearing:
+class TaperedRollerBearing(RollerRow):
     """Tapered roller bearing with a rotating cone (inner ring) and a rib at its large end.
 
     The axis of a roller is inclined by β = (α_o + α_i)/2 to that of the bearing, its taper half
@@ -82,8 +82,6 @@ class TaperedRollerBearing:
     >>> f"{bearing.thrust:.0f} N, largest rib force {bearing.rib_forces.max():.1f} N"
     '1255 N, largest rib force 66.7 N'
     """
-
-    place: ClassVar[str] = "cycle_angle"
 
     rollers: int
     roller_diameter: float
@@ -153,16 +151,6 @@ class TaperedRollerBearing:
             )
 
     @cached_property
-    def _roller(self) -> SlicedRoller:
-        """A roller by slices."""
-        return SlicedRoller(
-            diameter=self.roller_diameter,
-            length=self.roller_length,
-            profile=self.profile,
-            slices=self.slices,
-        )
-
-    @cached_property
     def taper_half_angle(self) -> float:
         """Half angle ν of the roller's cone [rad]: tan ν = (D/d_m) sin(α_o - ν)."""
         ratio = self.roller_diameter / self.pitch_diameter
@@ -220,11 +208,6 @@ class TaperedRollerBearing:
         inner, outer = self.kinematics.radii
         taper = math.cos(self.taper_half_angle)
         return inner * taper, outer * taper
-
-    @property
-    def angles(self) -> Field:
-        """Positions of the rollers, from the direction of the radial load [rad]."""
-        return 2.0 * np.pi * np.arange(self.rollers) / self.rollers
 
     @property
     def induced_thrust(self) -> float:
@@ -293,11 +276,6 @@ class TaperedRollerBearing:
         return roller_contacts(
             self.angles, self.slice_loads, self.radii, self.kinematics, self.roller_length
         )
-
-    @property
-    def frequencies(self) -> dict[str, float]:
-        """Frequencies of shaft, rings, roller and cage [Hz]."""
-        return self.kinematics.frequencies
 
     def notes(self, pair: ElasticPair) -> tuple[str, ...]:
         """Return the limits of the model, the angles, the thrust and the rib force."""

@@ -37,9 +37,10 @@ class _ContactLines(NamedTuple):
         return cls(problem.deflection, problem.undeformed, inside, stiffness, load, inside.size)
 
     def window(self, touching: Mask) -> tuple["_ContactLines", slice]:
-        """Return the touching lines and all between them."""
+        """Return the touching lines with a margin."""
+        margin = self.undeformed.shape[0] // DRY.window_margin
         lines = np.flatnonzero(touching.any(axis=1))
-        window = slice(lines[0], lines[-1] + 1)
+        window = slice(max(lines[0] - margin, 0), lines[-1] + 1 + margin)
         undeformed = self.undeformed[window]
         restrict_to = self.deflection.restrict_to(undeformed.shape[0])
         return self._replace(

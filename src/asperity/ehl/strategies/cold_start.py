@@ -198,11 +198,23 @@ def solve_cold(
             if finest.exact:
                 search.options, search.is_guess = options, False
                 del step  # its fields take as much memory as those of the next solution
-                step = solve_again(search, search.solved)
+                step = _solve_on_exact_faces(search)
         if search.converged(options.tolerance):
             break
     search.options = options
     return name, step
+
+
+def _solve_on_exact_faces(search: MixedSearch) -> Step:
+    """Solve again on exact faces, from the rough solution; if that fails, from a close one."""
+    tolerance, solved = search.options.tolerance, list(search.solved)
+    step = solve_again(search, solved)
+    if not (search.converged(tolerance) or search.arithmetic):
+        finest, guess = solved[-1]
+        close = search.first_converged(FROM_NEIGHBOUR, finest, guess)
+        if search.converged(tolerance):
+            step = solve_again(search, [*solved[:-1], (finest, unknowns_of(close))])
+    return step
 
 
 def solve_from_dry(search: MixedSearch, levels: Sequence[Problem]) -> Step:

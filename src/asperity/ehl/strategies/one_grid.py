@@ -172,12 +172,11 @@ def solve_again(search: MixedSearch, solved: Sequence[tuple[Problem, Pressures]]
             search.keep(exact, step)
         else:
             search.figures = []
-    if search.converged(search.options.tolerance):
+    if search.converged(tolerance):
         search.by_first_order = search.figures_of(back_to_first_order(exact, step))
     elif problem.viscosity_factor is not None:
         search.arithmetic = True
-        robust = replace(problem, exact=False)
-        return search.first_converged(FROM_NEIGHBOUR, robust, guess)
+        return search.first_converged(FROM_NEIGHBOUR, problem, guess)
     return step
 
 
@@ -186,14 +185,16 @@ def solve_exact(
 ) -> Step:
     """Solve exact faces by shared steps on the second-order wedge, or by cell through the first."""
     max_steps = min(SEARCH.max_long_iterations, search.options.max_iterations)
-    few = max_steps if problem.past is None else min(CONTINUATION.max_iterations, max_steps)
+    few, last = max_steps, search.options.max_iterations
+    if problem.past is not None:
+        few, last = min(CONTINUATION.max_iterations, max_steps), max_steps
     step = search.steps(problem, unknowns, tolerance, few, second_order=True)
     if search.converged(tolerance):
         return step
     roughly = max(RESIDUALS.rough_solution, tolerance)
     step = search.steps(problem, unknowns, roughly, max_steps, shared=False)
     return search.steps(
-        problem, unknowns_of(step), tolerance, max_steps, second_order=True, shared=False
+        problem, unknowns_of(step), tolerance, last, second_order=True, shared=False
     )
 
 
