@@ -19,10 +19,10 @@ from asperity.ehl.strategies.oil_state import oil_of, unknowns_of
 
 
 class Level(NamedTuple):
-    """A grid's place in the search: coarser than the finest, and how its guess came about.
+    """A grid's place in the search.
 
-    The first of the time steps is `length` half-widths long. On the `last` resort, conserved oil
-    that fails in time steps is solved by further ways.
+    `coarse` if it is not the finest; `length` of the first of its time steps, in half-widths;
+    `last` if conserved oil that fails in time steps is to be solved in another way.
     """
 
     coarse: bool = False
