@@ -23,6 +23,8 @@ from asperity.ehl.scales import Scales
 from asperity.ehl.strategies import cold_start
 from asperity.ehl.strategies.cold_start import STRATEGIES
 from asperity.ehl.strategies.mixed_search import MixedSearch
+from asperity.ehl.strategies.oil_state import load_share_of, unknowns_of
+from asperity.ehl.strategies.one_grid import back_to_first_order
 from asperity.lubricant import Barus
 from asperity.solution import contact_state
 from asperity.surface import flat_surface
@@ -270,6 +272,45 @@ def test_exact_faces_are_solved_from_a_close_guess_if_a_rough_one_fails(monkeypa
     assert contact_state(retried).clr == pytest.approx(contact_state(usual).clr, abs=2e-3)
     rough_guess, close_guess = guesses
     assert close_guess < 1e-4 < rough_guess
+
+
+@pytest.mark.parametrize(("sq", "seed"), [(0.5e-6, 1), (1e-6, 2)])
+def test_steps_back_to_the_first_order_wedge_reach_its_solution_within_two_fifths(sq, seed):
+    """After one step 43 and 64 % of the change of the load share are left."""
+    surface, scales = rough(grid((64, 64)), sq, seed=seed), Scales.from_conditions(CONDITIONS, OIL)
+    problem = replace(contact_problem(CONDITIONS, OIL, surface, Options()), exact=False)
+    search = MixedSearch(Options(), scales.gap, None)
+    second_order = cold_start.solve_from_dry(search, [problem])
+    first_order = search.steps(problem, unknowns_of(second_order), 1e-5, 150)
+    assert search.converged(1e-5)
+    back = back_to_first_order(problem, second_order)
+    truth, start, end = map(load_share_of, (first_order, second_order, back))
+    assert abs(end - truth) < 0.4 * abs(start - truth)
+
+
+@pytest.mark.parametrize(
+    ("surface", "film", "tried"),
+    [
+        (flat_surface(grid((64, 48))), 1.0, ["C3", "S3", "C2", "S2"]),
+        (flat_surface(grid((64, 48))), 1e-12, ["D2", "C3", "S3", "C2", "S2"]),
+        (rough(grid((64, 48)), 1e-6), 2e-6, ["C2", "D2"]),
+        (rough(grid((64, 48)), 1e-6), 5e-7, ["D2", "C2"]),
+    ],
+)
+def test_strategies_are_tried_in_their_order(monkeypatch, surface, film, tried):
+    """(D)ry, (C)oarse to fine, (S)ingle pressure; a wedge of third or second order."""
+    order = []
+
+    def failing(strategy, search, levels, guess):
+        order.append(f"{type(strategy).__name__.removeprefix('From')[0]}{2 + levels[0].accurate}")
+        pressure, approach = guess(levels[0])
+        return search.steps(levels[0], Pressures(pressure, pressure, approach), 1e-9, 0)
+
+    for kind in {type(strategy) for strategy in STRATEGIES}:
+        monkeypatch.setattr(kind, "solve", failing)
+    monkeypatch.setattr(cold_start, "smooth_film", lambda *_: film)
+    solved(surface, strict=False)
+    assert order == tried
 
 
 @pytest.mark.parametrize("strategy", STRATEGIES[:2], ids=lambda strategy: strategy.name)

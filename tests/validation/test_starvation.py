@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.controls import effort
 
 from asperity.case import load_case, load_machine
 from asperity.core.errors import BadInput, NotConverged
@@ -273,3 +274,10 @@ def test_a_starved_contact_that_does_not_converge_is_loud():
     with pytest.raises(NotConverged, match="contact not solved") as raised:
         solve_contact(*parts, options=options)
     assert raised.value.solution.gap.shape == (96, 8)
+
+
+def test_a_meniscus_does_without_short_time_steps():
+    """318 Newton steps if time steps may be a twentieth as long as the first."""
+    work = effort("starved rough line, 0.3 um")
+    assert work.solved
+    assert work.newton < 80
