@@ -6,7 +6,7 @@ and edge stress of roller ends are not modelled.
 """
 
 import math
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar, Literal, get_args
@@ -94,8 +94,8 @@ class SlicedRoller:
         return np.asarray(np.maximum(approach[:, None] - 2.0 * self.drop, 0.0))
 
 
-class RollerRow:
-    """Equally spaced rollers of a bearing."""
+class RollerBearing(ABC):
+    """Bearing with equally spaced rollers, solved by slices."""
 
     place: ClassVar[str] = "cycle_angle"
 
@@ -132,7 +132,7 @@ class RollerRow:
 
 
 @dataclass(frozen=True, kw_only=True)
-class CylindricalRollerBearing(RollerRow):
+class CylindricalRollerBearing(RollerBearing):
     """Cylindrical roller bearing with a rotating inner ring.
 
     Parameters

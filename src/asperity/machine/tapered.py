@@ -19,8 +19,8 @@ from asperity.machine.roller import (
     EXPONENT,
     SLICES,
     STIFFNESS,
+    RollerBearing,
     RollerProfile,
-    RollerRow,
     SlicedRoller,
     roller_contacts,
     steel_notes,
@@ -38,7 +38,7 @@ APEX_TOLERANCE = math.radians(0.1)  # of a stated cone angle, rounded by catalog
 
 
 @dataclass(frozen=True, kw_only=True)
-class TaperedRollerBearing(RollerRow):
+class TaperedRollerBearing(RollerBearing):
     """Tapered roller bearing with a rotating cone (inner ring) and a rib at its large end.
 
     The axis of a roller is inclined by β = (α_o + α_i)/2 to that of the bearing, its taper half

@@ -71,7 +71,7 @@ class ColdStart(ABC):
 
     @abstractmethod
     def applies(self, roughness: Roughness) -> bool:
-        """Return True where the strategy makes sense."""
+        """Return True where the strategy can be used."""
 
     @abstractmethod
     def solve(self, search: MixedSearch, levels: Sequence[Problem], guess: Guess) -> Step:
@@ -153,7 +153,7 @@ class FromSinglePressure(CoarseToFine):
         return step
 
 
-STRATEGIES = (  # in their order; rough bodies are also solved the other way round
+STRATEGIES = (  # in the order in which they are tried
     FromDry(SolveStrategy.FROM_DRY, dominant=True),
     CoarseToFine(SolveStrategy.COARSE_TO_FINE),
     FromSinglePressure(SolveStrategy.COARSE_TO_FINE),
@@ -193,7 +193,7 @@ def solve_cold(
         step = strategy.solve(search, levels, guess)
         if search.converged(tolerance):
             if finest.accurate and not strategy.third_order and roughness.sharp_ends:
-                name, step = search.refine_third_order(finest, step)
+                name, step = _refine_third_order(search, finest, step)
             solve_coarser_grid(search, robust)
             if finest.exact:
                 search.options, search.is_guess = options, False
@@ -203,6 +203,20 @@ def solve_cold(
             break
     search.options = options
     return name, step
+
+
+def _refine_third_order(
+    search: MixedSearch, problem: Problem, step: Step
+) -> tuple[SolveStrategy, Step]:
+    """Refine with the third-order wedge; return strategy and step, unchanged if this fails."""
+    earlier = list(search.history), list(search.figures), search.iteration_error
+    tolerance = search.options.tolerance
+    better = search.steps(problem, unknowns_of(step), tolerance, CONTINUATION.max_iterations)
+    if search.converged(tolerance):
+        search.figures[-1] = search.figures_of(better)
+        return SolveStrategy.COARSE_TO_FINE, better
+    search.history, search.figures, search.iteration_error = earlier
+    return SolveStrategy.SECOND_ORDER, step
 
 
 def _solve_on_exact_faces(search: MixedSearch) -> Step:

@@ -231,7 +231,7 @@ class Search:
         """
         discretisation = self.discretisation_error
         if start is not None:
-            same = _solves(start, surface, conditions, lubricant, self.options)
+            same = _is_same_contact(start, surface, conditions, lubricant, self.options)
             discretisation = start.convergence.discretisation_error if same else None
         scales, balance = Scales.from_conditions(conditions, lubricant), step.balance
         lines = surface.grid.cells[1]
@@ -283,14 +283,14 @@ class Search:
             self.progress(iteration)
 
 
-def _solves(
+def _is_same_contact(
     start: ContactSolution,
     surface: Surface,
     conditions: ContactConditions,
     lubricant: Lubricant | None,
     options: Options,
 ) -> bool:
-    """Return True if a solution is that of the same contact, whatever its temperature."""
+    """Return True for a solution of the same contact; its temperature may differ."""
     alike = replace(start.options, max_iterations=options.max_iterations)
     same = (start.conditions, start.lubricant, alike) == (conditions, lubricant, options)
     same = same and start.grid == surface.grid
@@ -322,7 +322,7 @@ class _Bracket:
 
 
 def on_all_lines(problem: Problem, field: AnyField, lines: int) -> AnyField:
-    """Expand a field, (nx', ny'), of a reduced problem to so many lines of cells."""
+    """Expand a field of a reduced problem, shape (nx', ny'), to shape (nx', lines)."""
     unfolded = problem.unfold(field)
     return np.repeat(unfolded, lines // unfolded.shape[1], axis=1)
 

@@ -12,7 +12,6 @@ from asperity.ehl.models.mixed import MixedBalance, Pressures
 from asperity.ehl.models.single_pressure import Problem
 from asperity.ehl.newton.mixed import newton
 from asperity.ehl.newton.single_pressure import Step
-from asperity.ehl.outcome import SolveStrategy
 from asperity.ehl.scales import Scales
 from asperity.ehl.strategies.grid_continuation import Search
 from asperity.ehl.strategies.oil_state import oil_of, unknowns_of
@@ -37,7 +36,7 @@ class GridStrategy(ABC):
     """Way to solve a contact on one grid from an initial guess."""
 
     def applies(self, problem: Problem, _guess: Pressures) -> bool:
-        """Return True where the strategy makes sense."""
+        """Return True where the strategy can be used."""
         return not problem.exact
 
     def target(self, search: "MixedSearch", problem: Problem, level: Level) -> tuple[float, int]:
@@ -114,20 +113,6 @@ class MixedSearch(Search):
         """Keep the figures of a grid's solution, for the estimate of the discretisation error."""
         self.figures.append(self.figures_of(step))
         self.solved = [*self.solved, (problem, unknowns_of(step))][-len(self.figures) :]
-
-    def refine_third_order(self, problem: Problem, step: Step) -> tuple[SolveStrategy, Step]:
-        """Refine a robust solution of smooth bodies with the third-order wedge.
-
-        Returns strategy and step, those of the robust solution if this fails.
-        """
-        earlier = list(self.history), list(self.figures), self.iteration_error
-        tolerance = self.options.tolerance
-        better = self.steps(problem, unknowns_of(step), tolerance, CONTINUATION.max_iterations)
-        if self.converged(tolerance):
-            self.figures[-1] = self.figures_of(better)
-            return SolveStrategy.COARSE_TO_FINE, better
-        self.history, self.figures, self.iteration_error = earlier
-        return SolveStrategy.SECOND_ORDER, step
 
     def oil(self, step: Step, lines: int, scales: Scales) -> Oil:
         """Return the state of the oil."""

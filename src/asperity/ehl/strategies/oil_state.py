@@ -45,7 +45,7 @@ def _signed(oil: Oil, problem: Problem, scales: Scales) -> Field:
 
 
 def oil_of(step: Step, lines: int, scales: Scales) -> Oil:
-    """Return the state of the oil of a step on so many lines of cells, in SI units."""
+    """Return the state of the oil after a Newton step in SI units, shape (nx, lines)."""
     balance = step.balance
     assert isinstance(balance, MixedBalance)
     content, pressure, growth = (
