@@ -14,7 +14,11 @@ import pytest
 import asperity as asp
 from asperity.contact.rollers import RollerShape
 from asperity.ehl import auto_grid
+from asperity.ehl.models.mixed import Pressures
+from asperity.ehl.outcome import SolveStrategy
 from asperity.ehl.problem_setup import contact_problem
+from asperity.ehl.strategies import cold_start
+from asperity.ehl.strategies.cold_start import CoarseToFine
 from asperity.solution import axial_distribution, dynamic_stiffness, tangent_stiffness
 from asperity.surface import gaussian_surface
 
@@ -26,6 +30,7 @@ OIL = asp.Lubricant(
     rheology=asp.Newtonian(),
 )
 ISO = RollerShape.iso(9e-3, LENGTH)
+SECOND = SolveStrategy.SECOND_ORDER
 
 
 def lundberg(load: float) -> RollerShape:
@@ -418,3 +423,25 @@ def test_without_speed_a_rough_roller_is_dry():
     slow, dry = (asp.solve_contact(conditions, oil, rough) for oil in (OIL, None))
     assert asp.contact_state(slow).clr > 0.999
     assert slow.pressure == pytest.approx(dry.pressure, abs=0.02 * dry.pressure.max())
+
+
+def test_a_roller_solved_by_the_second_order_wedge_is_refined_to_the_third(monkeypatch):
+    """The minimum film thickness of the second-order wedge differs by more than 0.1 %."""
+    usual = solved(roller(ISO), OIL, cells=(96, 64))
+    solve = CoarseToFine.solve
+
+    def failing_at_third(strategy, search, levels, guess):
+        if not strategy.third_order:
+            return solve(strategy, search, levels, guess)
+        pressure, approach = guess(levels[0])
+        return search.steps(levels[0], Pressures(pressure, pressure, approach), 1e-9, 0)
+
+    monkeypatch.setattr(CoarseToFine, "solve", failing_at_third)
+    refined = solved(roller(ISO), OIL, cells=(96, 64))
+    assert refined.convergence.attempt == usual.convergence.attempt == SolveStrategy.COARSE_TO_FINE
+    assert refined.gap.min() == pytest.approx(usual.gap.min(), rel=1e-3)
+
+    monkeypatch.setattr(cold_start, "_refine_third_order", lambda _, __, step: (SECOND, step))
+    rough = solved(roller(ISO), OIL, cells=(96, 64))
+    assert rough.convergence.attempt == SECOND
+    assert abs(rough.gap.min() / usual.gap.min() - 1.0) > 1e-3
